@@ -8,6 +8,7 @@ mod line;
 mod tail;
 #[cfg(test)]
 pub(crate) mod testing;
+mod usual_surface;
 
 pub use background::median;
 pub(crate) use background::{Background, hann, whitened};
@@ -18,3 +19,4 @@ pub(crate) use tail::{
     bonferroni, combine_dependent_p_values, ln_binomial_tail, ln_gamma_tail, ln_normal_bound,
     ln_student_tail,
 };
+pub(crate) use usual_surface::UsualSurface;

@@ -1,13 +1,11 @@
 //! Corrugation: a line with the same wavelength at every speed, on a stretch of rail.
 
 use crate::along::{
-    Background, Line, Ruler, Spectrum, amplitude, bonferroni, by_speed, combine_dependent_p_values,
-    median, on_even_places, separates_wavelengths, speed_m_s, whitened,
+    Background, Line, Ruler, Spectrum, UsualSurface, amplitude, bonferroni, by_speed,
+    combine_dependent_p_values, median, on_even_places, separates_wavelengths, speed_m_s, whitened,
 };
 use rustfft::num_complex::Complex64;
-use std::f64::consts::TAU;
 use tracktwin_signal::recording::{Pass, Recording};
-use tracktwin_track::model::Roughness;
 
 /// Shortest and longest tested wavelength, in sleeper spacings: 2 mm to 62 mm for a spacing of 125 mm.
 const WAVELENGTHS: [f64; 2] = [0.016, 0.5];
@@ -29,17 +27,14 @@ const CELLS_APART: f64 = 2.0;
 /// Smallest number of waves on a stretch. With fewer waves the 18 cells of neighbours exceed two fifths of
 /// the wave number, and resonances of the track affect the ratio.
 const WAVES_MIN: f64 = 45.0;
-/// Irregularity level (eq. B.6) to which amplitudes refer, and the relative deviation of its square root.
-const LEVEL: f64 = 3.0;
-const ROOT_LEVEL_DEVIATION: f64 = 0.23;
 
 /// A corrugated stretch of rail.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Corrugation {
     /// Wavelength in m and its standard deviation.
     pub wavelength_m: (f64, f64),
-    /// Amplitude in m and its standard deviation at irregularity level 3; proportional to the square root
-    /// of the level.
+    /// Amplitude in m and its standard deviation on the usual surface of the track; proportional to
+    /// the square root of its irregularity level.
     pub amplitude_m: (f64, f64),
     /// First and last position in m.
     pub stretch_m: [f64; 2],
@@ -219,12 +214,13 @@ impl CorrugationSearch<'_> {
         let extent = self.extent(best);
         // The amplitude is that of the stretch itself, not of one that reaches beyond it.
         let length = extent[1] - extent[0];
-        let density = TAU * Roughness::new(LEVEL).density(TAU * best.wave_number);
+        let surface = UsualSurface::of(self.recording);
+        let density = surface.density_m3(best.wave_number);
         let amplitude = amplitude(self.ratio(extent, best), density, length);
         let wavelength = 1.0 / best.wave_number;
         // A strong line's place is known to a fraction of a cell; the bins are half a cell apart.
         let deviation = 0.25 / (best.stretch_m[1] - best.stretch_m[0]) * wavelength * wavelength;
-        let relative = ROOT_LEVEL_DEVIATION.hypot(0.15);
+        let relative = surface.height_deviation.hypot(0.15);
         Corrugation {
             wavelength_m: (wavelength, deviation),
             amplitude_m: (amplitude, relative * amplitude),
@@ -275,6 +271,7 @@ impl CorrugationSearch<'_> {
 mod tests {
     use super::*;
     use crate::along::testing::{Rolled, noise};
+    use std::f64::consts::TAU;
 
     #[test]
     fn waves_in_a_single_loud_window_have_the_stretch_that_was_looked_at() {

@@ -2,7 +2,7 @@
 
 use super::repeated::{Cells, ImpactKind, cells};
 use super::shape::{Form, Observed, Shape, fit};
-use crate::along::{bonferroni, combine_dependent_p_values};
+use crate::along::{bonferroni, combine_dependent_p_values, separates_wavelengths};
 use tracktwin_signal::recording::Recording;
 
 /// An impact is present at a speed if the probability of its power by chance is below this.
@@ -38,7 +38,11 @@ pub struct Impact {
 /// Positions in `except` (`[from, to]` in m) are skipped.
 pub fn impacts(recording: &Recording, alpha: f64, except: &[[f64; 2]]) -> Vec<Impact> {
     let allowed = |x: f64| !except.iter().any(|[from, to]| (*from..=*to).contains(&x));
-    let by_kind = ImpactKind::BOTH.map(|kind| cells(recording, kind, false));
+    // At one speed, the band of long hollows is that of the track's resonances as well.
+    let is_usable =
+        |kind| kind != ImpactKind::LongHollows || separates_wavelengths(&recording.passes);
+    let kinds = ImpactKind::ALL.into_iter().filter(|kind| is_usable(*kind));
+    let by_kind: Vec<Vec<Cells>> = kinds.map(|kind| cells(recording, kind, false)).collect();
     let tries: usize = by_kind.iter().filter_map(|cells| Some(cells.first()?.ratio.len())).sum();
     let mut candidates = Vec::new();
     for speeds in by_kind.iter().filter(|speeds| !speeds.is_empty()) {
@@ -99,8 +103,8 @@ fn impact(recording: &Recording, speeds: &[Cells], cell: usize, ln_p: f64) -> Im
     let width = speeds[0].width_m;
     let mut places = Vec::new();
     let mut observed = Vec::new();
-    for pass in &recording.passes {
-        if let Some(seen) = Observed::at(pass, x, width) {
+    for pass in 0..recording.passes.len() {
+        if let Some(seen) = Observed::at(recording, pass, x, width) {
             places.push(seen.x_m);
             observed.push(seen);
         }
@@ -114,7 +118,7 @@ fn impact(recording: &Recording, speeds: &[Cells], cell: usize, ln_p: f64) -> Im
     // A millimetre is what the ringing of the contact hides; a single pass has no other to differ.
     let least = if places.len() > 1 { 1e-3 } else { 0.5 * width };
     let (place, deviation) = mean_and_deviation(&places, least).unwrap_or((x, width));
-    let shape = fit(&observed);
+    let shape = fit(recording, &observed);
     // The loudest moment may be at either edge of a hollow.
     let edge = match &shape {
         Some(Shape { form: Form::Hollow, length_m: (length, _), .. }) => 0.5 * length,

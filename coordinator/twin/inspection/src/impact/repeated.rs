@@ -7,8 +7,11 @@ use tracktwin_signal::recording::{Pass, Recording};
 /// Frequency range of a blow in Hz. In this range the power of the surface itself varies little along the
 /// track, and the contact rings.
 const BLOW_HZ: [f64; 2] = [700.0, 5000.0];
-/// Wave numbers in cycles/m of a hollow of 2 to 10 mm; its frequencies are proportional to the speed.
-const HOLLOW_PER_M: [f64; 2] = [100.0, 1000.0];
+/// Wave numbers in cycles per sleeper spacing of a hollow of 2 to 10 mm on V-Track, 10 to 48 mm on a line; its
+/// frequencies are proportional to the speed.
+const HOLLOW_PER_SPACING: [f64; 2] = [12.5, 125.0];
+/// The same of a hollow of 5 to 15 mm on V-Track, 25 to 70 mm on a line.
+const LONG_HOLLOW_PER_SPACING: [f64; 2] = [6.0, 40.0];
 /// Lowest frequency in Hz of a hollow; below it the ringing of the track is longer than the passage of the
 /// wheel.
 const HOLLOW_LOW_HZ: f64 = 200.0;
@@ -35,19 +38,28 @@ pub(crate) enum ImpactKind {
     Blows,
     /// Impacts with the same wavelengths at all speeds: hollows, which have little power at low speed.
     Hollows,
+    /// The same for longer hollows.
+    LongHollows,
 }
 
 impl ImpactKind {
-    pub(crate) const BOTH: [Self; 2] = [Self::Blows, Self::Hollows];
+    pub(crate) const ALL: [Self; 3] = [Self::Blows, Self::Hollows, Self::LongHollows];
 
-    /// The frequency band in Hz for a pass; `None` if it is empty.
-    pub(crate) fn band(self, pass: &Pass, background: &Background) -> Option<[f64; 2]> {
-        let speed = speed_m_s(pass);
+    /// The frequency band in Hz for a pass over sleepers of this spacing; `None` if it is empty.
+    pub(crate) fn band(
+        self,
+        pass: &Pass,
+        background: &Background,
+        spacing_m: f64,
+    ) -> Option<[f64; 2]> {
+        let hollow_hz = |waves: [f64; 2]| {
+            let [low, high] = waves.map(|waves| waves * speed_m_s(pass) / spacing_m);
+            [low.max(HOLLOW_LOW_HZ), high]
+        };
         let [low, high] = match self {
             Self::Blows => BLOW_HZ,
-            Self::Hollows => {
-                [(HOLLOW_PER_M[0] * speed).max(HOLLOW_LOW_HZ), HOLLOW_PER_M[1] * speed]
-            }
+            Self::Hollows => hollow_hz(HOLLOW_PER_SPACING),
+            Self::LongHollows => hollow_hz(LONG_HOLLOW_PER_SPACING),
         };
         let top = HIGH_SHARE * pass.signal.sample_rate_hz();
         let audible = background.audible_hz(AUDIBLE).max(2.0 * low);
@@ -103,7 +115,9 @@ pub(crate) fn cells(recording: &Recording, kind: ImpactKind, each: bool) -> Vec<
         return Vec::new();
     }
     let count = ((last_m - first_m) / step_m) as usize + 1;
-    let grid = Grid { kind, first_m, step_m, width_m, count, near: near(recording, step_m) };
+    let spacing_m = recording.spacing_m;
+    let near = ((NEAR_SPACINGS * spacing_m / step_m).round() as usize).max(8);
+    let grid = Grid { kind, spacing_m, first_m, step_m, width_m, count, near };
     groups.into_iter().filter_map(|group| grid.cells(passes, group)).collect()
 }
 
@@ -111,18 +125,15 @@ pub(crate) fn cells(recording: &Recording, kind: ImpactKind, each: bool) -> Vec<
 fn width(recording: &Recording, kind: ImpactKind) -> Option<f64> {
     let mut width = CELL_SHARE * recording.spacing_m;
     for pass in &recording.passes {
-        let [low, high] = kind.band(pass, &Background::of(&pass.signal)?)?;
+        let [low, high] = kind.band(pass, &Background::of(&pass.signal)?, recording.spacing_m)?;
         width = width.max(PRODUCT_MIN * speed_m_s(pass) / (high - low));
     }
     (width < 0.5 * recording.spacing_m).then_some(width)
 }
 
-fn near(recording: &Recording, step_m: f64) -> usize {
-    ((NEAR_SPACINGS * recording.spacing_m / step_m).round() as usize).max(8)
-}
-
 struct Grid {
     kind: ImpactKind,
+    spacing_m: f64,
     first_m: f64,
     step_m: f64,
     width_m: f64,
@@ -152,7 +163,8 @@ impl Grid {
 
     fn powers(&self, pass: &Pass) -> Option<Vec<f64>> {
         let background = Background::of(&pass.signal)?;
-        let white = whitened(&pass.signal, &background, self.kind.band(pass, &background)?);
+        let band_hz = self.kind.band(pass, &background, self.spacing_m)?;
+        let white = whitened(&pass.signal, &background, band_hz);
         let energy = Energy::new(pass, &white);
         let power = |cell: usize| {
             let middle = self.first_m + cell as f64 * self.step_m;

@@ -5,27 +5,22 @@
 //! track. `S` is eq. B.6; its level scales the depth and not the length.
 
 use super::repeated::ImpactKind;
-use crate::along::{Background, hann, speed_m_s};
+use crate::along::{Background, UsualSurface, hann, speed_m_s};
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
-use tracktwin_signal::recording::Pass;
-use tracktwin_track::model::Roughness;
+use tracktwin_signal::recording::{Pass, Recording};
 
 /// Examined time in s before and after the first blow; afterwards the track rings.
-const BEFORE_S: f64 = 0.005;
-const AFTER_S: f64 = 0.015;
+const BEFORE_S: f64 = 0.01;
+const AFTER_S: f64 = 0.03;
 /// Lowest frequency in Hz for the shape.
-const LOW_HZ: f64 = 250.0;
+const LOW_HZ: f64 = 80.0;
 /// Number of bands per octave.
 const BANDS_PER_OCTAVE: f64 = 6.0;
 /// Standard deviation of the logarithm of a band's ratio: difference in power between the track at one
 /// position and the mean track (about 1 dB).
 const MODEL_DEVIATION: f64 = 0.25;
-/// Irregularity level (eq. B.6) to which depths refer, and the relative standard deviation of its square
-/// root: levels are between 1 and 5.
-const LEVEL: f64 = 3.0;
-const ROOT_LEVEL_DEVIATION: f64 = 0.23;
 /// Smallest number of bands for a shape.
 const BANDS_MIN: usize = 6;
 
@@ -45,10 +40,10 @@ pub struct Shape {
     pub form: Form,
     /// Length `l` of the form in m and its standard deviation.
     pub length_m: (f64, f64),
-    /// Depth in m and its standard deviation at irregularity level 3; proportional to the square root of
-    /// the level.
+    /// Depth in m and its standard deviation on the usual surface of the track; proportional to the square
+    /// root of its irregularity level.
     pub depth_m: (f64, f64),
-    /// Change of slope at the kink in rad at level 3: `2 d/l` of a dip. More accurate than depth and
+    /// Change of slope at the kink in rad, as the depth: `2 d/l` of a dip. More accurate than depth and
     /// length.
     pub slope_rad: f64,
     /// Advantage over the other form in nats: half the difference of the sums of squares.
@@ -68,9 +63,10 @@ pub(crate) struct Observed {
 
 impl Observed {
     /// The blow nearest to `x_m`, within `reach_m`; `None` if the pass ends too close to it.
-    pub(crate) fn at(pass: &Pass, x_m: f64, reach_m: f64) -> Option<Self> {
+    pub(crate) fn at(recording: &Recording, pass: usize, x_m: f64, reach_m: f64) -> Option<Self> {
+        let pass = &recording.passes[pass];
         let background = Background::of(&pass.signal)?;
-        let [_, high] = ImpactKind::Blows.band(pass, &background)?;
+        let [_, high] = ImpactKind::Blows.band(pass, &background, recording.spacing_m)?;
         let rate = pass.signal.sample_rate_hz();
         let samples = pass.signal.samples();
         let blow = loudest(pass, samples, x_m, reach_m);
@@ -151,10 +147,11 @@ impl Form {
         }
     }
 
-    const fn lengths_m(self) -> [f64; 2] {
+    /// Shortest and longest length in sleeper spacings: 1.5 mm to 0.1 m for a hollow on V-Track.
+    const fn lengths(self) -> [f64; 2] {
         match self {
-            Self::Dip => [2e-3, 0.3],
-            Self::Hollow => [1.5e-3, 0.1],
+            Self::Dip => [0.016, 2.4],
+            Self::Hollow => [0.012, 0.8],
         }
     }
 }
@@ -167,11 +164,15 @@ struct Fitted {
 }
 
 /// Fits form and size to all observed blows together; `None` if there are too few bands.
-pub(crate) fn fit(observed: &[Observed]) -> Option<Shape> {
+pub(crate) fn fit(recording: &Recording, observed: &[Observed]) -> Option<Shape> {
     if observed.iter().map(|seen| seen.bands.len()).sum::<usize>() < BANDS_MIN {
         return None;
     }
-    let [dip, hollow] = [Form::Dip, Form::Hollow].map(|form| grid(form, observed));
+    let surface = UsualSurface::of(recording);
+    let grid = |form: Form| {
+        grid(form, form.lengths().map(|share| share * recording.spacing_m), observed, &surface)
+    };
+    let [dip, hollow] = [Form::Dip, Form::Hollow].map(grid);
     let (form, best, other) = if best_of(&dip).squares < best_of(&hollow).squares {
         (Form::Dip, dip, hollow)
     } else {
@@ -180,7 +181,7 @@ pub(crate) fn fit(observed: &[Observed]) -> Option<Shape> {
     let chosen = best_of(&best);
     let (length, length_deviation) = spread(&best, chosen.squares, |fitted| fitted.length);
     let (depth, depth_deviation) = spread(&best, chosen.squares, |fitted| fitted.depth);
-    let depth_deviation = depth_deviation.hypot(ROOT_LEVEL_DEVIATION * depth);
+    let depth_deviation = depth_deviation.hypot(surface.height_deviation * depth);
     Some(Shape {
         form,
         length_m: (length, length_deviation),
@@ -207,19 +208,21 @@ fn spread(grid: &[Fitted], least: f64, quantity: impl Fn(&Fitted) -> f64) -> (f6
 }
 
 /// Fits of all lengths of the form, each with its best depth.
-fn grid(form: Form, observed: &[Observed]) -> Vec<Fitted> {
+fn grid(
+    form: Form,
+    [shortest, longest]: [f64; 2],
+    observed: &[Observed],
+    surface: &UsualSurface,
+) -> Vec<Fitted> {
     const LENGTHS: usize = 120;
-    let [shortest, longest] = form.lengths_m();
     let length_of =
         |step: usize| shortest * (longest / shortest).powf(step as f64 / (LENGTHS - 1) as f64);
-    let roughness = Roughness::new(LEVEL);
     let fitted = |length: f64| {
         let expected: Vec<(f64, f64, f64, f64)> = observed
             .iter()
             .flat_map(|seen| {
                 seen.bands.iter().map(|&(k, q, variance)| {
-                    let unit =
-                        form.transform(length, k).powi(2) / (PI * roughness.density(TAU * k));
+                    let unit = 2.0 * form.transform(length, k).powi(2) / surface.density_m3(k);
                     (q.ln(), unit, seen.floor, variance)
                 })
             })

@@ -3,6 +3,8 @@
 use super::{Form, Impact, corrugation, impacts};
 use crate::along::testing::{Rolled, hollow_m, independent};
 use std::f64::consts::TAU;
+use tracktwin_signal::Signal;
+use tracktwin_signal::recording::Recording;
 
 /// The share of false alarms that a single test has in the sweep.
 const ALPHA: f64 = 0.0025;
@@ -31,6 +33,27 @@ fn a_long_hollow_that_a_slow_wheel_rolls_through_quietly_is_found() {
     let shape = found[0].shape.clone().unwrap();
     assert_eq!((found.len(), shape.form), (1, Form::Hollow), "{found:?}");
     assert!((shape.length_m.0 / 1e-2 - 1.0).abs() < 0.15, "{shape:?}");
+}
+
+/// The same passes, rolled at twice the speed.
+fn at_twice_the_speed(mut recording: Recording) -> Recording {
+    let rate_hz = 2.0 * recording.sample_rate_hz;
+    recording.sample_rate_hz = rate_hz;
+    for pass in &mut recording.passes {
+        pass.speed_km_h *= 2.0;
+        pass.signal = Signal::new(rate_hz, pass.signal.samples().to_vec()).unwrap();
+    }
+    recording
+}
+
+#[test]
+fn a_hollow_too_long_for_the_band_of_short_ones_is_found() {
+    let height = |_, x| hollow_m(2e-5, 1.5e-2, x - 1.7);
+    let surface = Rolled { height_m: &height, ..Rolled::faultless(6) };
+    let found = impacts(&at_twice_the_speed(surface.recording()), ALPHA, &[]);
+    let shape = found[0].shape.clone().unwrap();
+    assert_eq!((found.len(), shape.form), (1, Form::Hollow), "{found:?}");
+    assert!((shape.length_m.0 / 1.5e-2 - 1.0).abs() < 0.15, "{shape:?}");
 }
 
 #[test]

@@ -9,6 +9,7 @@ use self::findings::{
     clipping_finding, comb_finding, corrugation_finding, flat_finding, gain_finding, hum_finding,
     impact_finding, offset_finding, order_finding, scale_finding,
 };
+use crate::along::by_speed;
 use crate::chain::{Gain, LossOfContact, Offsets, PassDefect};
 use crate::finding::{Finding, Place};
 use crate::wheel::{Comb, Flat, Order};
@@ -157,7 +158,9 @@ fn surface(recording: &Recording) -> (Option<Flat>, Vec<Finding>) {
     let circumference = wheel::nominal_circumference_m(recording);
     let flat = circumference.and_then(|length| wheel::flat(recording, length, EACH_TEST));
     let reach = AROUND_BLOW * recording.spacing_m;
-    let blows = flat.as_ref().map(|flat| common_places(&flat.blows_m, reach)).unwrap_or_default();
+    let speeds = by_speed(&recording.passes);
+    let common = |flat: &Flat| common_places(&flat.blows_m, &speeds, reach);
+    let blows = flat.as_ref().map(common).unwrap_or_default();
     let turn = flat.as_ref().map(|flat| flat.circumference_m.0);
     let mut orders = circumference
         .map(|length| wheel::out_of_round(recording, turn.unwrap_or(length), EACH_TEST))
@@ -187,12 +190,19 @@ fn is_longer_than(order: &Order, flat: &Flat) -> bool {
     flat.circumference_m.0 / order.number as f64 > 4.0 * length
 }
 
-/// Stretches `[from, to]` in m around those blows of the first pass that all other passes share.
-fn common_places(blows_m: &[Vec<f64>], reach_m: f64) -> Vec<[f64; 2]> {
-    let Some((first, others)) = blows_m.split_first() else { return Vec::new() };
+/// Stretches `[from, to]` in m around blows that occur at one place at every speed, in one pass or more: an
+/// impact of the rail is looked for in the mean power of the passes at a speed. `speeds` are the indices of
+/// their passes.
+fn common_places(blows_m: &[Vec<f64>], speeds: &[Vec<usize>], reach_m: f64) -> Vec<[f64; 2]> {
+    let Some((first, others)) = speeds.split_first() else { return Vec::new() };
+    let blows_at = |speed: &Vec<usize>| -> Vec<f64> {
+        speed.iter().flat_map(|&pass| blows_m[pass].iter().copied()).collect()
+    };
+    let others: Vec<Vec<f64>> = others.iter().map(blows_at).collect();
     let met =
-        |x: f64| others.iter().all(|pass| pass.iter().any(|other| (other - x).abs() < reach_m));
-    first.iter().filter(|x| met(**x)).map(|&x| [x - reach_m, x + reach_m]).collect()
+        |x: f64| others.iter().all(|speed| speed.iter().any(|other| (other - x).abs() < reach_m));
+    let common = blows_at(first).into_iter().filter(|x| met(*x));
+    common.map(|x| [x - reach_m, x + reach_m]).collect()
 }
 
 #[cfg(test)]
@@ -236,6 +246,16 @@ mod tests {
                 assert_eq!(names(&recording), [expected], "{}", recording.name);
             }
         }
+    }
+
+    #[test]
+    fn a_place_is_common_if_some_pass_of_every_speed_has_a_blow_there() {
+        let blows_m = [vec![0.5, 0.9], vec![0.7], vec![0.71, 1.1], vec![0.3]];
+        let of = |speeds: &[Vec<usize>]| common_places(&blows_m, speeds, 0.02);
+        let found = of(&[vec![0, 1], vec![2, 3]]);
+        assert_eq!(found.len(), 1);
+        assert!(found[0][0] < 0.7 && 0.7 < found[0][1], "{found:?}");
+        assert!(of(&[vec![0], vec![1], vec![2]]).is_empty());
     }
 
     #[test]

@@ -102,7 +102,7 @@ fn describe(recording: &Recording, passes: &[Cells], folds: &[Fold], ln_p: f64) 
         let index = cells.passes[0];
         powers.extend(fold.blows.iter().map(|&cell| cells.ratio[cell]));
         for &cell in &fold.blows {
-            let seen = Observed::at(&recording.passes[index], cells.place_m(cell), cells.width_m);
+            let seen = Observed::at(recording, index, cells.place_m(cell), cells.width_m);
             blows_m[index].push(seen.as_ref().map_or(cells.place_m(cell), |seen| seen.x_m));
             observed.extend(seen);
         }
@@ -116,7 +116,7 @@ fn describe(recording: &Recording, passes: &[Cells], folds: &[Fold], ln_p: f64) 
         ln_p,
         power_ratio: powers.iter().sum::<f64>() / powers.len() as f64,
         blows_m,
-        shape: fit(&observed),
+        shape: fit(recording, &observed),
     }
 }
 

@@ -5,13 +5,12 @@
 //! begin with the same angle, the orders appear in the passes themselves.
 
 use crate::along::{
-    Line, Ruler, Spectrum, amplitude, bonferroni, by_speed, combine_dependent_p_values,
-    on_even_places, separates_wavelengths, speed_m_s,
+    Line, Ruler, Spectrum, UsualSurface, amplitude, bonferroni, by_speed,
+    combine_dependent_p_values, on_even_places, separates_wavelengths, speed_m_s,
 };
 use rustfft::num_complex::Complex64;
-use std::f64::consts::{FRAC_1_SQRT_2, TAU};
+use std::f64::consts::FRAC_1_SQRT_2;
 use tracktwin_signal::recording::{Pass, Recording};
-use tracktwin_track::model::Roughness;
 
 /// Largest relative deviation of the circumference from its nominal value, from wear and odometer scale.
 ///
@@ -49,9 +48,6 @@ const PART_SHARE: f64 = 0.2;
 /// power: the side lobes of the Hann window at five cells are 50 dB down.
 const LEAKS: usize = 4;
 const LEAKAGE: f64 = 1e3;
-/// Irregularity level (eq. B.6) to which amplitudes refer, and the relative deviation of its square root.
-const LEVEL: f64 = 3.0;
-const ROOT_LEVEL_DEVIATION: f64 = 0.23;
 
 /// One order of an out-of-round wheel.
 #[derive(Clone, Debug, PartialEq)]
@@ -279,9 +275,10 @@ impl OrderSearch<'_> {
         let over_surface = lines.iter().zip(passes).map(|(line, passes)| {
             passes.ratio.max(1.0 + (line.ratio - 1.0) * line.beside / passes.beside)
         });
-        let density = TAU * Roughness::new(LEVEL).density(TAU * wave_number);
+        let surface = UsualSurface::of(self.recording);
+        let density = surface.density_m3(wave_number);
         let amplitude = amplitude(mean(over_surface), density, self.length());
-        (amplitude, ROOT_LEVEL_DEVIATION.hypot(0.25) * amplitude)
+        (amplitude, surface.height_deviation.hypot(0.25) * amplitude)
     }
 
     fn audible(&self, wave_number: f64) -> bool {
