@@ -255,11 +255,13 @@ pub(super) fn load_models(folder: &Path) -> Result<Trained, Stop> {
         .or_input()
 }
 
+/// Files of an evaluation.
+pub(super) const RESULTS: [&str; 6] =
+    [PAGE, PICTURE, "evaluation.csv", "evaluation.json", "inversion.csv", "inversion.json"];
+
 /// Checks that an evaluation can be written into a folder.
 pub(super) fn check_files(folder: &Path, force: Force) -> Result<(), FilesError> {
-    let names =
-        [PAGE, PICTURE, "evaluation.csv", "evaluation.json", "inversion.csv", "inversion.json"];
-    check(folder, Kind::Results, force, &names)
+    check(folder, Kind::Results, force, &RESULTS)
 }
 
 /// Evaluates a recording with models of this library and, if `beside` is set, also by inversion, whose

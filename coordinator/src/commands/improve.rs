@@ -23,6 +23,9 @@ use tracktwin_signal::recording::Recording;
 /// Folders of the evaluations without and with what was found.
 const FOLDERS: [&str; 2] = ["before", "after"];
 
+/// Files of the comparison of both evaluations.
+const RESULTS: [&str; 2] = ["report.html", "improvement.json"];
+
 /// Number of cases of each of the two campaigns.
 const CASES_EACH: &str = "400";
 
@@ -65,7 +68,7 @@ pub(super) struct Arguments {
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let Arguments { recording: path, out, library, track, cases, cores, force } = arguments;
     let recording = Recording::open(&path).or_input()?;
-    check(&out, Kind::Results, force, &["report.html", "improvement.json"])?;
+    remove_earlier(&out, force)?;
     make_folder(&out)?;
     let library = library.unwrap_or_else(|| campaign::default_library(&out));
     // What no campaign can serve is refused before the diagnosis, which takes minutes.
@@ -91,9 +94,6 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         return Err(Stop::Negative);
     }
 
-    for name in FOLDERS {
-        remove_inversion(&out.join(name), force)?;
-    }
     println_stderr("2 of 4: campaign of the track without what was found");
     let evaluated = |campaign: PathBuf, out: PathBuf, diagnosis: Option<PathBuf>| {
         campaign::Arguments::of(campaign, &path, &library, out, cores, force, diagnosis)
@@ -123,11 +123,16 @@ async fn simulate(arguments: campaign::Arguments) -> Result<(), Stop> {
     }
 }
 
-/// Removes the inversion of an earlier run, which would be shown if the inversion of this run fails.
-fn remove_inversion(folder: &Path, force: Force) -> Result<(), Stop> {
-    evaluate::check_files(folder, force)?;
-    for name in ["inversion.json", "inversion.csv"] {
-        let path = folder.join(name);
+/// Removes the results of an earlier run, which would be taken for those of this run if it ends before its
+/// own are written, or finds nothing.
+fn remove_earlier(out: &Path, force: Force) -> Result<(), Stop> {
+    check(out, Kind::Results, force, &RESULTS)?;
+    let mut paths: Vec<PathBuf> = RESULTS.iter().map(|name| out.join(name)).collect();
+    for folder in FOLDERS.map(|name| out.join(name)) {
+        evaluate::check_files(&folder, force)?;
+        paths.extend(evaluate::RESULTS.iter().map(|name| folder.join(name)));
+    }
+    for path in paths {
         match std::fs::remove_file(&path) {
             Err(error) if error.kind() != ErrorKind::NotFound => {
                 return Err(anyhow!("{}: {error}", path.display()).into());
