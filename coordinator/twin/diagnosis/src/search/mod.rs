@@ -1,6 +1,7 @@
 //! Search for left-out physics: baseline, alarm, candidates, acceptance.
 
 mod chance;
+mod detected_shape;
 mod everywhere;
 mod extent;
 mod fit;

@@ -1,6 +1,7 @@
 //! One search for an extension: screening, fit, test on held-out speeds, acceptance.
 
 use super::chance::{excess, tail_probability, whitened};
+use super::detected_shape::detected_shape_first;
 use super::everywhere::everywhere;
 use super::fit::fit;
 use super::limits::{HELD_OUT_MIN, REFINED_PER_KIND};
@@ -212,6 +213,8 @@ impl<'a> Setting<'a> {
                 starts(problem, current, all, &templates, screened, threshold, hopeless)?;
             starts.extend(outlier_starts.starts());
             round.fitted = fit(problem, current, all, starts, progress);
+            let shapes_m = &self.prepared.detected_shapes_m;
+            detected_shape_first(&mut round.fitted, &problem.forward.section, shapes_m);
         }
         Ok((round, ports))
     }

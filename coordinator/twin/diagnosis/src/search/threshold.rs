@@ -1,5 +1,6 @@
 //! Smallest evidence of a candidate, alone or in addition to accepted ones.
 
+use super::detected_shape::is_detected;
 use super::extent::Extent;
 use super::probability::EVIDENCE_TEMPERING;
 use crate::candidate::Candidate;
@@ -10,6 +11,9 @@ use tracktwin_track::extension::Class;
 /// location. A model error looks like a small second effect there, except for an effect without a location
 /// in addition to a local shape.
 const FURTHER_SHARE_MIN: f64 = 0.25;
+
+/// The same near a shape that the passes alone show.
+const NEAR_SHAPE_SHARE_MIN: f64 = 1.0;
 
 /// Smallest log evidence of a candidate in addition to accepted ones, in nats, on a track other than V-Track.
 /// Errors of the track model reach 22 nats there: on five recordings of another simulator, kinds that did not
@@ -62,11 +66,9 @@ impl EvidenceThreshold<'_> {
         }
         let [one, other] =
             [known, candidate].map(|candidate| Extent::of(candidate, self.section).with_reach());
-        if one.meets(other) {
-            FURTHER_SHARE_MIN * (other.length() / one.length()).min(1.0)
-        } else {
-            0.0
-        }
+        let is_shown = is_detected(known, self.section, self.detected_shapes_m);
+        let least = if is_shown { NEAR_SHAPE_SHARE_MIN } else { FURTHER_SHARE_MIN };
+        if one.meets(other) { least * (other.length() / one.length()).min(1.0) } else { 0.0 }
     }
 
     /// Whether the fit of a candidate may reach the threshold, from the gain in nats of a trial with free
@@ -142,5 +144,11 @@ mod tests {
         assert_eq!(threshold.share(gap, bolts), 0.25);
         assert_eq!(threshold.share(joint_at(10.0), bolts), 0.0);
         assert_eq!(threshold.share(joint_at(10.0), joint_at(10.5)), 0.25);
+
+        let joint_m = joint_at(10.0).extension.x_m.unwrap();
+        let shown = EvidenceThreshold { detected_shapes_m: &[joint_m], ..threshold };
+        let [near, far] = [11, 20].map(|sleeper| of("missing_railpad", Some(&[sleeper])));
+        assert_eq!(shown.share(joint_at(10.0), near), 1.0);
+        assert_eq!(shown.share(joint_at(10.0), far), 0.0);
     }
 }
