@@ -54,8 +54,8 @@ const LEAKAGE: f64 = 1e3;
 pub struct Order {
     /// Number of waves per turn.
     pub number: usize,
-    /// Amplitude in m and its standard deviation at irregularity level 3; proportional to the square root
-    /// of the level.
+    /// Amplitude in m and its standard deviation on the usual surface of the track; proportional to the
+    /// square root of its irregularity level.
     pub amplitude_m: (f64, f64),
     /// Natural logarithm of the probability of such a line at any order of a round wheel.
     pub ln_p: f64,
