@@ -87,14 +87,15 @@ pub async fn diagnose(
     check_track(recording, &track.design)?;
     watch("first look", 0.0);
     let mut inspection = compute(|| inspect(recording));
-    let mut prepared = match compute(|| PreparedRecording::new(recording, track)) {
-        Ok(prepared) => prepared,
-        Err(reason) => {
-            inspection.forget(allowed);
-            let diagnosis = passes_alone(recording, &inspection, &reason).ok_or(reason)?;
-            return Ok(Diagnosed { diagnosis, compared: None });
-        }
-    };
+    let mut prepared =
+        match compute(|| PreparedRecording::new(recording, track, &inspection.misplaced)) {
+            Ok(prepared) => prepared,
+            Err(reason) => {
+                inspection.forget(allowed);
+                let diagnosis = passes_alone(recording, &inspection, &reason).ok_or(reason)?;
+                return Ok(Diagnosed { diagnosis, compared: None });
+            }
+        };
     if let Some(defect) = inspection.refusal() {
         return Err(PreparationError::Unusable(defect.clone()).into());
     }

@@ -161,7 +161,11 @@ struct Measured {
 }
 
 impl Measured {
-    fn of(recording: &Recording, design: &TrackDesign) -> Result<Self, PreparationError> {
+    fn of(
+        recording: &Recording,
+        design: &TrackDesign,
+        except: &[usize],
+    ) -> Result<Self, PreparationError> {
         check_track(recording, design)?;
         let fastest = recording.passes.iter().map(|pass| pass.speed_km_h).fold(0.0, f64::max);
         let lowest_hz = LOWEST_PERIODS * fastest / 3.6 / design.sleeper.spacing_m;
@@ -181,7 +185,7 @@ impl Measured {
             let margin_m = MARGIN_SPANS * recording.spacing_m;
             return Err(PreparationError::TooShort { sleepers: sleepers.len(), margin_m });
         }
-        let spectra = Spectra::new(recording, &bands);
+        let spectra = Spectra::new(recording, &bands, except);
         Ok(Self { bands, spectra, sleepers })
     }
 
@@ -219,12 +223,16 @@ impl Measured {
 }
 
 impl PreparedRecording {
-    /// Prepares a recording for comparison with `track`.
+    /// Prepares a recording for comparison with `track`, without the passes with the indices `except`.
     ///
     /// # Errors
     /// [`PreparationError`] with the first requirement that the recording does not meet.
-    pub fn new(recording: &Recording, track: &Track) -> Result<Self, PreparationError> {
-        let measured = Measured::of(recording, &track.design)?;
+    pub fn new(
+        recording: &Recording,
+        track: &Track,
+        except: &[usize],
+    ) -> Result<Self, PreparationError> {
+        let measured = Measured::of(recording, &track.design, except)?;
         Ok(measured.prepared(recording, track, measured.sleepers.clone()))
     }
 
@@ -239,7 +247,7 @@ impl PreparedRecording {
         length: usize,
         overlap: usize,
     ) -> Result<Vec<Self>, PreparationError> {
-        let measured = Measured::of(recording, &track.design)?;
+        let measured = Measured::of(recording, &track.design, &[])?;
         let ranges = overlapping(measured.sleepers.clone(), length, overlap);
         Ok(ranges.into_iter().map(|range| measured.prepared(recording, track, range)).collect())
     }
@@ -271,7 +279,7 @@ impl PreparedRecording {
         further: &Recording,
     ) -> Vec<Option<f64>> {
         let forward = &self.forward;
-        let spectra = Spectra::new(further, &forward.bands);
+        let spectra = Spectra::new(further, &forward.bands, &[]);
         let mut all = vec![None; forward.count()];
         for (number, passes) in self.pass_numbers.iter().enumerate() {
             let speed_km_h = recording.passes[passes[0]].speed_km_h;

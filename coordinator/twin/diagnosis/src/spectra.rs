@@ -47,14 +47,15 @@ pub struct SpeedSpectra {
 }
 
 impl Spectra {
-    /// Computes the powers of all passes over all sleepers.
-    pub fn new(recording: &Recording, bands: &Bands) -> Self {
+    /// Computes the powers of all passes over all sleepers, except the passes with these indices.
+    pub fn new(recording: &Recording, bands: &Bands, except: &[usize]) -> Self {
         let powers: Vec<_> = (0..recording.passes.len())
             .into_par_iter()
-            .map(|pass| pass_powers(recording, pass, bands))
+            .filter(|pass| !except.contains(pass))
+            .map(|pass| (pass, pass_powers(recording, pass, bands)))
             .collect();
         let mut speeds: Vec<SpeedSpectra> = Vec::new();
-        for (pass, log_power) in powers.into_iter().enumerate() {
+        for (pass, log_power) in powers {
             let speed_km_h = recording.passes[pass].speed_km_h;
             let noise_density = noise_density(&recording.passes[pass].signal);
             let known = speeds.iter_mut().find(|known| are_one_speed(speed_km_h, known.speed_km_h));

@@ -14,6 +14,7 @@ impl Evidence<'_> {
     pub(super) fn notes(&self, hypotheses: &[Hypothesis]) -> Vec<String> {
         let mut notes: Vec<String> =
             self.inspection.pass_defects.iter().map(ToString::to_string).collect();
+        notes.extend(self.not_compared());
         if self.speeds() == 1 {
             notes.push(one_speed(3.6 * self.prepared.forward.speeds_m_s[0]));
         }
@@ -28,6 +29,19 @@ impl Evidence<'_> {
         notes.extend(self.speed_disagreement().or_else(|| self.remainder(hypotheses)));
         notes.extend(self.inspection.findings.iter().map(shown));
         notes
+    }
+
+    /// Note on the passes that were not compared with the track because of their positions.
+    fn not_compared(&self) -> Option<String> {
+        let file = |&pass: &usize| &*self.recording.passes[pass].file;
+        let files: Vec<&str> = self.inspection.misplaced.iter().map(file).collect();
+        (!files.is_empty()).then(|| {
+            format!(
+                "{}: not compared with the track, because their positions differ from those of another \
+                     pass at the same speed.",
+                files.join(", ")
+            )
+        })
     }
 
     /// Note on the significant residual after the last search.

@@ -21,6 +21,7 @@ pub(crate) use contact::expected_m_s2;
 pub use contact::{LossOfContact, PassLoss, loss_of_contact};
 pub use gain::{Gain, gains};
 pub use hum::{Hum, hum};
+pub(crate) use offset::misplaced;
 pub use offset::{Offset, Offsets, offsets};
 pub use pass_defect::{PassDefect, pass_defects};
 pub use scale::{Scale, scale};

@@ -92,6 +92,23 @@ pub fn offsets(recording: &Recording) -> Vec<Offsets> {
     pairs.filter_map(|pair| compare(recording, pair)).collect()
 }
 
+/// Passes whose positions differ from those of the others at their speed: the pass that differs from all
+/// others, or both of two, because nothing tells which one is wrong. `is_error` tells whether the odometers of
+/// a pair differ too much.
+pub(crate) fn misplaced(offsets: &[Offsets], is_error: impl Fn(&Offsets) -> bool) -> Vec<usize> {
+    let at_speed = offsets.chunk_by(|one, other| one.passes[0] == other.passes[0]);
+    at_speed
+        .flat_map(|pairs| {
+            let wrong: Vec<&Offsets> = pairs.iter().filter(|pair| is_error(pair)).collect();
+            match (wrong.as_slice(), pairs.len()) {
+                ([only], 1) => only.passes.to_vec(),
+                (all, count) if all.len() == count => vec![all[0].passes[0]],
+                (some, _) => some.iter().map(|pair| pair.passes[1]).collect(),
+            }
+        })
+        .collect()
+}
+
 fn compare(recording: &Recording, passes: [usize; 2]) -> Option<Offsets> {
     let [first, second] = passes.map(|index| &recording.passes[index]);
     let from = first.position_m[0].max(second.position_m[0]);
@@ -172,4 +189,26 @@ fn best_lag(part: &[Complex64], other: &[Complex64], start: usize, reach: usize)
         }
     }
     Match { lag: lag - reach as f64, correlation: values[best], elsewhere: median(values) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_pass_that_differs_from_all_others_is_misplaced_and_of_two_both_are() {
+        let pair = |first: usize, second: usize, offset_m: f64| Offsets {
+            passes: [first, second],
+            matched: vec![Offset { x_m: 1.0, offset_m, correlation: 0.9 }],
+            stretches: 1,
+            correlation: 0.9,
+            low_hz: 500.0,
+            spacing_m: 0.6,
+        };
+        let of = |pairs: &[Offsets]| misplaced(pairs, |pair| pair.greatest_m() > 0.1);
+        assert_eq!(of(&[pair(0, 1, 0.01), pair(2, 3, 0.2)]), [2, 3]);
+        assert_eq!(of(&[pair(0, 1, 0.2), pair(0, 2, 0.01)]), [1]);
+        assert_eq!(of(&[pair(0, 1, 0.2), pair(0, 2, 0.2)]), [0]);
+        assert!(of(&[pair(0, 1, 0.01)]).is_empty());
+    }
 }

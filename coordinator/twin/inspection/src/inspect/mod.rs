@@ -47,6 +47,9 @@ pub struct Inspection {
     pub gains: Vec<Gain>,
     /// Offsets between passes at one speed.
     pub offsets: Vec<Offsets>,
+    /// Passes that cannot be compared with a track, because their positions differ from those of another pass
+    /// at their speed. Empty if fewer than two speeds would be left.
+    pub misplaced: Vec<usize>,
     /// The comb of wheel orders for a wheel of unknown circumference, from the first pass with a comb.
     pub comb: Option<Comb>,
 }
@@ -106,11 +109,11 @@ pub fn inspect(recording: &Recording) -> Inspection {
     let comb = unknown_wheel(recording);
     findings.extend(comb.as_ref().map(comb_finding));
     // Blows of a flat lie elsewhere in every pass: passes with them are not to be laid on each other.
-    if flat.is_none() {
-        let alarm = EACH_TEST.ln() - (offsets.len().max(1) as f64).ln();
-        let unrelated = offsets.iter().filter(|pair| pair.ln_p() <= alarm);
-        findings.extend(unrelated.map(offset_finding));
-    }
+    let alarm = EACH_TEST.ln() - (offsets.len().max(1) as f64).ln();
+    let is_error = |pair: &Offsets| flat.is_none() && pair.ln_p() <= alarm;
+    findings.extend(offsets.iter().filter(|pair| is_error(pair)).map(offset_finding));
+    let misplaced = chain::misplaced(&offsets, is_error);
+    let misplaced = if leaves_speeds(recording, &misplaced) { misplaced } else { Vec::new() };
     findings.extend(on_surface);
     let loss_of_contact = chain::loss_of_contact(recording);
     if let Some(lost) = &loss_of_contact {
@@ -125,8 +128,15 @@ pub fn inspect(recording: &Recording) -> Inspection {
         noise_floors: chain::noise_floors(recording),
         gains,
         offsets,
+        misplaced,
         comb,
     }
+}
+
+/// Whether two speeds are left without these passes.
+fn leaves_speeds(recording: &Recording, passes: &[usize]) -> bool {
+    let is_left = |speed: &Vec<usize>| speed.iter().any(|pass| !passes.contains(pass));
+    by_speed(&recording.passes).into_iter().filter(is_left).count() >= 2
 }
 
 /// Whether a finding lies on a stretch without contact or at its end, where the landing of the wheel causes
