@@ -10,6 +10,9 @@ use tracktwin_track::extension::{Class, Kind, LookAlikeGroup, PlaceKind};
 /// Distance in sleeper spacings within which the signature of an accepted extension may resemble a finding.
 const REACH_SPANS: f64 = 3.0;
 
+/// Parameter of waves on the rail.
+const WAVELENGTH: &str = "wavelength_m";
+
 impl Evidence<'_> {
     /// Adds a finding of the inspection as a separate hypothesis, unless the search with the model also
     /// found it.
@@ -32,6 +35,7 @@ impl Evidence<'_> {
         if let Some(known) = nearest {
             known.probability = known.probability.max(probability);
             if known.accepted {
+                take_wavelength(known, finding);
                 return;
             }
         }
@@ -60,6 +64,17 @@ impl Evidence<'_> {
             accepted: !explained,
             ..seen(finding, kind, location)
         });
+    }
+}
+
+/// Takes the wavelength of a finding if it is known better than the fitted one: the passes resolve a line, the
+/// fit has six bands per octave.
+fn take_wavelength(known: &mut Hypothesis, finding: &Finding) {
+    let fitted = known.parameters.get_mut(WAVELENGTH);
+    if let (Some(fitted), Some(&(mean, sd))) = (fitted, finding.parameters.get(WAVELENGTH))
+        && sd < fitted.sd
+    {
+        *fitted = Estimate { mean, sd };
     }
 }
 
@@ -122,6 +137,25 @@ pub(super) fn probability(finding: &Finding) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn of_two_wavelengths_the_better_known_one_is_stated() {
+        let mut known = Hypothesis::accepted("corrugation", None);
+        let fitted = Estimate { mean: 0.047, sd: 1e-4 };
+        known.parameters.insert(WAVELENGTH.to_owned(), fitted);
+        let mut finding = Finding {
+            physics: "corrugation",
+            p_value: 1e-9,
+            place: tracktwin_inspection::Place::Everywhere,
+            parameters: BTreeMap::from([("wavelength_m", (0.045, 2e-4))]),
+            evidence: String::new(),
+        };
+        take_wavelength(&mut known, &finding);
+        assert_eq!(known.parameters[WAVELENGTH], fitted);
+        finding.parameters.insert(WAVELENGTH, (0.045, 5e-5));
+        take_wavelength(&mut known, &finding);
+        assert_eq!(known.parameters[WAVELENGTH], Estimate { mean: 0.045, sd: 5e-5 });
+    }
 
     #[test]
     fn an_effect_explains_what_is_found_beside_it_and_not_what_is_found_far_away() {

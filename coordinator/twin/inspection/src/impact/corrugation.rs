@@ -28,6 +28,9 @@ const CELLS_APART: f64 = 2.0;
 /// the wave number, and resonances of the track affect the ratio.
 const WAVES_MIN: f64 = 45.0;
 
+/// Relative standard deviation of an odometer's scale.
+const SCALE_DEVIATION: f64 = 2e-3;
+
 /// A corrugated stretch of rail.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Corrugation {
@@ -222,7 +225,7 @@ impl CorrugationSearch<'_> {
         let deviation = 0.25 / (best.stretch_m[1] - best.stretch_m[0]) * wavelength * wavelength;
         let relative = surface.height_deviation.hypot(0.15);
         Corrugation {
-            wavelength_m: (wavelength, deviation),
+            wavelength_m: (wavelength, deviation.hypot(SCALE_DEVIATION * wavelength)),
             amplitude_m: (amplitude, relative * amplitude),
             stretch_m: extent,
             ln_p,
