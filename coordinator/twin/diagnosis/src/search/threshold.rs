@@ -16,7 +16,7 @@ const FURTHER_SHARE_MIN: f64 = 0.25;
 const NEAR_SHAPE_SHARE_MIN: f64 = 1.0;
 
 /// Smallest log evidence of a candidate in addition to accepted ones, in nats, on a track other than V-Track.
-/// Errors of the track model reach 22 nats there: on five recordings of another simulator, kinds that did not
+/// Errors of the track model reach 22 nats there: on four recordings of another simulator, kinds that did not
 /// exist were found beside a true one with 14 to 22 nats.
 const FURTHER_MIN: f64 = 30.0;
 
