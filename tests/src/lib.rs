@@ -7,6 +7,7 @@ pub use made_up::RAIL_ABSORBER;
 pub use process::{Process, until};
 pub use test_needs::free_port;
 
+use std::path::Path;
 use std::process::{Command, Output};
 
 /// Part of a campaign file for tests of the farm: a coarse, short model.
@@ -46,4 +47,29 @@ pub fn run(program: &str, arguments: &[&str]) -> Answer {
         out: String::from_utf8_lossy(&stdout).into_owned(),
         err: String::from_utf8_lossy(&stderr).into_owned(),
     }
+}
+
+/// Simulates a recording with two passes at each of these speeds in km/h, on a track of `spans` spans with the
+/// physics of this extension file (none if it is empty). Returns the path of the recording.
+///
+/// # Panics
+/// Panics if the extension file cannot be written or the simulation fails.
+pub fn simulated(
+    program: &str,
+    recording: &Path,
+    spans: &str,
+    speeds: &[&str],
+    extension: &str,
+) -> String {
+    let [file, out] =
+        [recording.with_extension("toml"), recording.into()].map(|path| path.display().to_string());
+    let mut arguments = vec!["simulate", "--passes", "2", "--spans", spans, "--seed", "3"];
+    arguments.extend(speeds.iter().flat_map(|speed| ["--speed", speed]));
+    arguments.extend(["--out", &out]);
+    if !extension.is_empty() {
+        std::fs::write(&file, extension).expect("the folder of the recording can be written");
+        arguments.extend(["--extension", &file]);
+    }
+    run(program, &arguments).succeeded();
+    out
 }

@@ -7,7 +7,7 @@ use serde_json::Value;
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::path::Path;
-use system_tests::{Answer, run};
+use system_tests::{Answer, run, simulated};
 use tempfile::TempDir;
 use test_needs::shared_data;
 use tracktwin_signal::Signal;
@@ -24,14 +24,7 @@ fn recorded(speeds: &[&str], extension: &str) -> TempDir {
 /// As [`recorded`], on a track of `spans` spans.
 fn recorded_over(spans: &str, speeds: &[&str], extension: &str) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("extension.toml");
-    std::fs::write(&file, extension).unwrap();
-    let [file, out] = [file, folder.path().join("recording")].map(|p| p.display().to_string());
-    let speeds = speeds.iter().flat_map(|speed| ["--speed", speed]);
-    let mut arguments = vec!["simulate", "--passes", "2", "--spans", spans, "--seed", "3"];
-    arguments.extend(speeds);
-    arguments.extend(["--extension", &file, "--out", &out]);
-    assert_eq!(run(PROGRAM, &arguments).code, Some(0));
+    simulated(PROGRAM, &folder.path().join("recording"), spans, speeds, extension);
     folder
 }
 

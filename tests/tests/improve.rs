@@ -1,10 +1,8 @@
 //! One command finds the physics that the track model lacks, adds it, and evaluates the recording again.
 
-#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
-
 use serde_json::Value;
 use std::path::Path;
-use system_tests::{Answer, run};
+use system_tests::{Answer, run, simulated};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 
@@ -13,16 +11,7 @@ const MISSING_RAILPAD: &str =
 
 /// A recording of thirteen sleepers, two passes at each of two speeds, with this extension file.
 fn recorded(folder: &Path, name: &str, extension: &str) -> String {
-    let [file, out] = [format!("{name}.toml"), name.to_owned()].map(|name| folder.join(name));
-    std::fs::write(&file, extension).unwrap();
-    let [file, out] = [file, out].map(|path| path.display().to_string());
-    let mut arguments = vec!["simulate", "--passes", "2", "--spans", "25", "--seed", "3"];
-    arguments.extend(["--speed", "13", "--speed", "10", "--out", &out]);
-    if !extension.is_empty() {
-        arguments.extend(["--extension", &file]);
-    }
-    assert_eq!(run(PROGRAM, &arguments).code, Some(0));
-    out
+    simulated(PROGRAM, &folder.join(name), "25", &["13", "10"], extension)
 }
 
 fn improved(recording: &str, out: &Path) -> Answer {

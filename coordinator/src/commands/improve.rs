@@ -68,7 +68,7 @@ pub(super) struct Arguments {
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let Arguments { recording: path, out, library, track, cases, cores, force } = arguments;
     let recording = Recording::open(&path).or_input()?;
-    remove_earlier(&out, force)?;
+    check(&out, Kind::Results, force, &RESULTS)?;
     make_folder(&out)?;
     let library = library.unwrap_or_else(|| campaign::default_library(&out));
     // What no campaign can serve is refused before the diagnosis, which takes minutes.
@@ -76,6 +76,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let checked = Campaign::read(&plain, None).or_input()?;
     check_for_training(&checked).or_input()?;
     campaign::check(&recording, &checked).or_input()?;
+    remove_earlier(&out, force)?;
 
     println_stderr("1 of 4: diagnosis");
     let confirm = has_pass_to_withhold(&recording);
@@ -126,7 +127,6 @@ async fn simulate(arguments: campaign::Arguments) -> Result<(), Stop> {
 /// Removes the results of an earlier run, which would be taken for those of this run if it ends before its
 /// own are written, or finds nothing.
 fn remove_earlier(out: &Path, force: Force) -> Result<(), Stop> {
-    check(out, Kind::Results, force, &RESULTS)?;
     let mut paths: Vec<PathBuf> = RESULTS.iter().map(|name| out.join(name)).collect();
     for folder in FOLDERS.map(|name| out.join(name)) {
         evaluate::check_files(&folder, force)?;

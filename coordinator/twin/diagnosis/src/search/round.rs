@@ -1,7 +1,7 @@
 //! One search for an extension: screening, fit, test on held-out speeds, acceptance.
 
 use super::chance::{excess, tail_probability, whitened};
-use super::detected_shape::detected_shape_first;
+use super::detected_shape::{detected_shape_first, is_detected};
 use super::everywhere::everywhere;
 use super::fit::fit;
 use super::limits::{HELD_OUT_MIN, REFINED_PER_KIND};
@@ -286,7 +286,6 @@ pub(super) fn accepted_candidate<'r>(
 /// physics may therefore fit better.
 fn is_shape_at(port: &PortPlace, candidate: &Candidate, prepared: &PreparedRecording) -> bool {
     let section = &prepared.forward.section;
-    let is_shape = is_local_shape(candidate);
     let seats = match port {
         PortPlace::Seats(seats) => &seats[..],
         PortPlace::Between(pair) => pair,
@@ -296,12 +295,10 @@ fn is_shape_at(port: &PortPlace, candidate: &Candidate, prepared: &PreparedRecor
     let spacing_m = section.track.design.sleeper.spacing_m;
     let [first, last] = [seats[0], seats[seats.len() - 1]];
     let seats_m = [section.x_m(first) - spacing_m, section.x_m(last) + spacing_m];
-    let is_detected = |shape_m: &[f64; 2]| section.are_beside([from_m, to_m], *shape_m);
-    is_shape
-        && seats.len() <= 2
+    seats.len() <= 2
         && seats_m[0] <= from_m
         && to_m <= seats_m[1]
-        && prepared.detected_shapes_m.iter().any(is_detected)
+        && is_detected(candidate, section, &prepared.detected_shapes_m)
 }
 
 /// The best trials: one of each candidate and a few of each kind; then, for each kind without a trial, the
