@@ -10,7 +10,7 @@
 
 use rustfft::num_complex::Complex64;
 use std::f64::consts::TAU;
-use tracktwin_track::frequency::{receptances_ahead, shares};
+use tracktwin_track::frequency::shares;
 use tracktwin_track::model::TrackModel;
 
 /// Effect of all further wheels.
@@ -25,17 +25,19 @@ pub(crate) struct FurtherWheels {
 impl FurtherWheels {
     /// Computes the effect for a model's wheels. `hertz` is the contact stiffness in N/m, `direct` the
     /// receptance of the rail in m/N, and `stiffness` that of contact, rail and vehicle in series in N/m,
-    /// both `[line][node]`.
+    /// both `[line][node]`. `ahead` gives the
+    /// receptances of the rail at a distance in m, as [`receptances_ahead`](tracktwin_track::frequency::receptances_ahead).
     pub(crate) fn new(
         model: &TrackModel,
         lines_hz: &[f64],
         hertz: f64,
         direct: &[Vec<Complex64>],
         stiffness: &[Vec<Complex64>],
+        ahead: impl Fn(f64) -> Vec<Vec<Complex64>>,
     ) -> Self {
         let mut all = Self::default();
         for &distance_m in &model.vehicle().further_wheels_m {
-            let one = OneWheel { model, hertz, distance_m };
+            let one = OneWheel { model, hertz, distance_m, between: ahead(distance_m) };
             let (gains, parts): (Vec<_>, Vec<_>) =
                 one.gains_and_parts(lines_hz, direct, stiffness).into_iter().unzip();
             all.parts.push(parts);
@@ -71,6 +73,8 @@ struct OneWheel<'a> {
     model: &'a TrackModel,
     hertz: f64,
     distance_m: f64,
+    /// Receptances of the rail from each node to this wheel in m/N, `[line][node]`.
+    between: Vec<Vec<Complex64>>,
 }
 
 impl OneWheel<'_> {
@@ -82,7 +86,6 @@ impl OneWheel<'_> {
         direct: &[Vec<Complex64>],
         stiffness: &[Vec<Complex64>],
     ) -> Vec<(Vec<f64>, Vec<f64>)> {
-        let between = receptances_ahead(self.model, lines_hz, self.distance_m);
         let nodes_m = self.model.layout().rail_nodes_m();
         let there: Vec<_> =
             nodes_m.iter().map(|x_m| shares(nodes_m, x_m + self.distance_m)).collect();
@@ -97,7 +100,7 @@ impl OneWheel<'_> {
                 let rail: Complex64 =
                     there.iter().map(|&(other, share)| share * direct[line][other]).sum();
                 let (first, second) = (stiffness[line][node].inv(), wheel + rail);
-                let between = between[line][node];
+                let between = self.between[line][node];
                 let [own, other] = [second.norm_sqr(), between.norm_sqr()];
                 let shared = (first * second - between * between).norm_sqr();
                 (first.norm_sqr() * (own + other) / shared, other / (own + other))

@@ -7,7 +7,9 @@ use rustfft::num_complex::Complex64;
 use std::f64::consts::TAU;
 use std::ops::Range;
 use std::sync::Arc;
-use tracktwin_track::frequency::{KnownRail, RailReceptances, SeatReceptances, StateReceptances};
+use tracktwin_track::frequency::{
+    KnownRail, RailReceptances, SeatReceptances, StateReceptances, receptances_ahead,
+};
 use tracktwin_track::model::{HertzContact, TrackModel};
 
 /// Transfer of a track with its extensions, at all spectral lines and all rail nodes.
@@ -47,7 +49,7 @@ impl Transfer {
     pub(crate) fn new(model: TrackModel, lines_hz: &[f64], reach: Option<usize>) -> Self {
         let RailReceptances { direct, from_seats, by_state } =
             RailReceptances::new(&model, lines_hz, reach);
-        let on_rail = Self::on_rail(model, lines_hz, Arc::new(direct), None);
+        let on_rail = Self::on_rail(model, lines_hz, Arc::new(direct), None, None);
         Self { by_state, ..on_rail }.with_seats(from_seats)
     }
 
@@ -82,15 +84,16 @@ impl Transfer {
         let adds_law = model.force_laws().len() != self.model.force_laws().len();
         let has_wheels = model.vehicle().further_wheels_m == self.model.vehicle().further_wheels_m;
         let further = has_wheels.then(|| Arc::clone(&self.further_wheels));
-        let direct = if !adds_law && model.matrices() == self.model.matrices() {
-            Arc::clone(&self.direct)
-        } else {
-            Arc::new(match self.known_rail.as_deref() {
-                Some((known, reach)) => known.direct_of(&model, *reach),
-                None => RailReceptances::new(&model, lines_hz, None).direct,
-            })
+        let known = self.known_rail.as_deref();
+        if !adds_law && model.matrices() == self.model.matrices() {
+            let (direct, known) = (Arc::clone(&self.direct), known.map(|(known, _)| known));
+            return Self::on_rail(model, lines_hz, direct, known, further);
+        }
+        let direct = match known {
+            Some((known, reach)) => known.direct_of(&model, *reach),
+            None => RailReceptances::new(&model, lines_hz, None).direct,
         };
-        Self::on_rail(model, lines_hz, direct, further)
+        Self::on_rail(model, lines_hz, Arc::new(direct), None, further)
     }
 
     /// Transfer with the force laws active as in a slightly different model; with `alike` the model may
@@ -104,14 +107,18 @@ impl Transfer {
     ) -> Option<Self> {
         let direct = self.by_state.as_ref()?.direct_where(&model, alike)?;
         let further = Some(Arc::clone(&self.further_wheels));
-        Some(Self::on_rail(model, lines_hz, Arc::new(direct), further))
+        Some(Self::on_rail(model, lines_hz, Arc::new(direct), None, further))
     }
 
+    /// Transfer with these receptances of the rail. `known` is the same rail, if it was solved before;
+    /// `further` is the effect of the further wheels, if it is known.
+    ///
     /// Source: docs/diagnosis.md, eq. 2, 3: `|H| = |a/F| / |1/k_H + alpha_r + alpha_w|`.
     fn on_rail(
         model: TrackModel,
         lines_hz: &[f64],
         direct: Arc<Vec<Vec<Complex64>>>,
+        known: Option<&KnownRail>,
         further: Option<Arc<FurtherWheels>>,
     ) -> Self {
         let hertz = hertz(&model);
@@ -130,7 +137,11 @@ impl Transfer {
         };
         let mut power: Vec<Vec<f64>> = lines_hz.iter().zip(&stiffness).map(power_of_line).collect();
         let further_wheels = further.unwrap_or_else(|| {
-            Arc::new(FurtherWheels::new(&model, lines_hz, hertz, &direct, &stiffness))
+            let ahead = |distance_m| match known {
+                Some(known) => known.ahead(distance_m),
+                None => receptances_ahead(&model, lines_hz, distance_m),
+            };
+            Arc::new(FurtherWheels::new(&model, lines_hz, hertz, &direct, &stiffness, ahead))
         });
         for (power, gain) in power.iter_mut().flatten().zip(further_wheels.gains()) {
             *power *= gain;

@@ -1,10 +1,12 @@
 //! Receptances of the rail between two places at a fixed distance, for two wheels at any position.
 
+use super::banded::Inverse;
 use super::lane::{LANES, Lane, omega};
-use super::rail::Partition;
+use super::rail::{Partition, deflections};
 use crate::model::TrackModel;
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
+use std::ops::Range;
 
 /// Receptances in m/N between every rail node and the place `distance_m` ahead of the node (negative:
 /// behind), as `[frequency][node]`. The value is zero where that place is not on the rail. Between nodes
@@ -15,20 +17,126 @@ pub fn receptances_ahead(
     distance_m: f64,
 ) -> Vec<Vec<Complex64>> {
     let partition = Partition::new(model);
-    let nodes_m = model.layout().rail_nodes_m();
-    let dof = |node: usize| model.layout().rail_node_dofs(node)[0];
-    let pairs: Vec<Vec<_>> = (0..nodes_m.len())
-        .map(|node| {
-            let there = shares(nodes_m, nodes_m[node] + distance_m);
-            let held = |(other, share)| Some((dof(node)?, dof(other)?, share));
-            there.into_iter().filter_map(held).collect()
-        })
-        .collect();
+    let pairs = Pairs::ahead(model, distance_m);
     let chunks = frequencies_hz.par_chunks(LANES).flat_map_iter(|chunk| {
-        let lanes = pulp::Arch::new().dispatch(|| partition.between(omega(chunk), &pairs));
+        let lanes = pulp::Arch::new().dispatch(|| pairs.values(&partition.inverted(omega(chunk))));
         (0..chunk.len()).map(move |lane| lanes.iter().map(|value| value.get(lane)).collect())
     });
-    chunks.collect()
+    let values = chunks.collect();
+    Between { pairs, values }.ahead(model, distance_m)
+}
+
+/// Receptances in m/N between nodes of the rail.
+pub(super) struct Between {
+    pairs: Pairs,
+    /// `[frequency][pair]`.
+    values: Vec<Vec<Complex64>>,
+}
+
+impl Between {
+    /// Between all nodes of a model with these inverses, one for each group of frequencies. On one thread:
+    /// who waits for the result in a parallel task may hold the others.
+    pub(super) fn all<'a>(
+        model: &TrackModel,
+        frequencies_hz: &[f64],
+        inverses: impl Iterator<Item = &'a Inverse>,
+    ) -> Self {
+        let pairs = Pairs::all(model);
+        let mut values = Vec::with_capacity(frequencies_hz.len());
+        for (chunk, inverse) in frequencies_hz.chunks(LANES).zip(inverses) {
+            let lanes = pulp::Arch::new().dispatch(|| pairs.values(inverse));
+            let of_lane = |lane: usize| lanes.iter().map(|value| value.get(lane)).collect();
+            values.extend((0..chunk.len()).map(of_lane));
+        }
+        Self { pairs, values }
+    }
+
+    /// As [`receptances_ahead`]. The pairs include those at this distance.
+    pub(super) fn ahead(&self, model: &TrackModel, distance_m: f64) -> Vec<Vec<Complex64>> {
+        let nodes_m = model.layout().rail_nodes_m();
+        let of_node = |(node, x_m): (usize, &f64)| {
+            let there = shares(nodes_m, x_m + distance_m).into_iter();
+            there.map(|(other, share)| (self.pairs.place(node, other), share)).collect()
+        };
+        let there: Vec<Vec<(usize, f64)>> = nodes_m.iter().enumerate().map(of_node).collect();
+        let of_line = |values: &Vec<Complex64>| {
+            let sum = |there: &Vec<(usize, f64)>| {
+                there.iter().map(|&(place, share)| share * values[place]).sum()
+            };
+            there.iter().map(sum).collect()
+        };
+        self.values.iter().map(of_line).collect()
+    }
+}
+
+/// Pairs of rail nodes: each node with a range of nodes that are not before it.
+struct Pairs {
+    /// For each node: number of its first pair, and the other nodes.
+    others: Vec<(usize, Range<usize>)>,
+    /// Degree of freedom of the deflection of every node; `None` for held nodes.
+    dofs: Vec<Option<usize>>,
+}
+
+impl Pairs {
+    fn new(model: &TrackModel, others: Vec<Range<usize>>) -> Self {
+        let mut count = 0;
+        let numbered = others.into_iter().map(|others| {
+            let first = count;
+            count += others.len();
+            (first, others)
+        });
+        Self { others: numbered.collect(), dofs: deflections(model) }
+    }
+
+    fn all(model: &TrackModel) -> Self {
+        let count = model.layout().rail_nodes_m().len();
+        Self::new(model, (0..count).map(|node| node..count).collect())
+    }
+
+    /// The pairs that [`Between::ahead`] needs at this distance.
+    fn ahead(model: &TrackModel, distance_m: f64) -> Self {
+        let nodes_m = model.layout().rail_nodes_m();
+        let mut others: Vec<Option<Range<usize>>> = vec![None; nodes_m.len()];
+        for (node, x_m) in nodes_m.iter().enumerate() {
+            for (other, _) in shares(nodes_m, x_m + distance_m) {
+                let (one, other) = (node.min(other), node.max(other));
+                let known = others[one].take().unwrap_or(other..other + 1);
+                others[one] = Some(known.start.min(other)..known.end.max(other + 1));
+            }
+        }
+        Self::new(model, others.into_iter().map(Option::unwrap_or_default).collect())
+    }
+
+    fn place(&self, node: usize, other: usize) -> usize {
+        let (first, others) = &self.others[node.min(other)];
+        first + node.max(other) - others.start
+    }
+
+    /// Entries of the inverse for all pairs, zero for held nodes. Every column is computed once, from its
+    /// diagonal to the farthest required row.
+    #[inline(always)]
+    fn values(&self, inverse: &Inverse) -> Vec<Lane> {
+        let mut by_column = vec![Vec::new(); inverse.size()];
+        for ((first, others), row) in self.others.iter().zip(&self.dofs) {
+            for (place, other) in (*first..).zip(others.clone()) {
+                if let (Some(row), Some(column)) = (*row, self.dofs[other]) {
+                    by_column[column].push((row, place));
+                }
+            }
+        }
+        let count = self.others.last().map_or(0, |(first, others)| first + others.len());
+        let mut values = vec![Lane::default(); count];
+        let mut work = vec![Lane::default(); inverse.size()];
+        for (column, rows) in by_column.iter().enumerate() {
+            // Nodes are in order.
+            let Some(&(first, _)) = rows.first() else { continue };
+            inverse.column_above(column, first, &mut work);
+            for &(row, place) in rows {
+                values[place] = work[row];
+            }
+        }
+        values
+    }
 }
 
 /// The two nodes next to the place `x_m`, each with its weight for linear interpolation. Empty if the
@@ -43,44 +151,24 @@ pub fn shares(nodes_m: &[f64], x_m: f64) -> Vec<(usize, f64)> {
     vec![(after - 1, 1.0 - share), (after, share)]
 }
 
-impl Partition<'_> {
-    /// Sums of the inverse's entries of these rows and columns, by their shares.
-    #[inline(always)]
-    fn between(
-        &self,
-        omega: impl Fn(usize) -> f64,
-        pairs: &[Vec<(usize, usize, f64)>],
-    ) -> Vec<Lane> {
-        let inverse = self.inverted(omega);
-        let mut work = vec![Lane::default(); self.rail_dofs];
-        let mut sums = vec![Lane::default(); pairs.len()];
-        for (sum, pairs) in sums.iter_mut().zip(pairs) {
-            for &(one, other, share) in pairs {
-                let (row, column) = (one.min(other), one.max(other));
-                inverse.column_above(column, row, &mut work);
-                *sum = *sum + work[row] * Lane::real(share);
-            }
-        }
-        sums
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::rail::tests::track;
     use super::*;
-    use crate::frequency::{ReceptancePoint, receptance};
+    use crate::frequency::{KnownRail, ReceptancePoint, receptance};
 
     #[test]
     fn receptances_ahead_are_those_of_the_general_solver() {
         let track = track();
         let frequencies: Vec<f64> = (0..11).map(|k| 60.0 * 1.5_f64.powi(k)).collect();
+        let known = KnownRail::new(&track, &frequencies);
         let nodes_m = track.layout().rail_nodes_m();
         let spacing_m = nodes_m[1] - nodes_m[0];
         for distance_m in [1.0, 9.0, -6.0].map(|nodes| nodes * spacing_m) {
             // Half a node further: the mean of two.
             let ahead = [0.0, 0.5 * spacing_m]
                 .map(|more_m| receptances_ahead(&track, &frequencies, distance_m + more_m));
+            assert_eq!(ahead[0], known.ahead(distance_m));
             for node in [7, 16, 20] {
                 let at = |x_m: f64| {
                     let from = ReceptancePoint::Rail(nodes_m[node]);

@@ -29,11 +29,6 @@ impl Lane {
     }
 
     #[inline(always)]
-    pub(super) fn real(value: f64) -> Self {
-        Self { re: [value; LANES], im: [0.0; LANES] }
-    }
-
-    #[inline(always)]
     pub(super) fn recip(self) -> Self {
         let scale: [f64; LANES] =
             array::from_fn(|i| 1.0 / (self.re[i] * self.re[i] + self.im[i] * self.im[i]));

@@ -3,6 +3,7 @@
 //! The differences change the dynamic stiffness of the rail at a few degrees of freedom only. The
 //! receptances follow from those of the solved track by a low-rank update.
 
+use super::ahead::Between;
 use super::banded::Inverse;
 use super::lane::{LANES, Lane, omega};
 use super::piece::Piece;
@@ -15,6 +16,7 @@ use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
+use std::sync::OnceLock;
 
 /// Largest number of changed degrees of freedom of the rail. With more of them, a complete solution is
 /// as fast.
@@ -27,6 +29,8 @@ pub struct KnownRail {
     /// For each group of frequencies, the inverse of the rail and that of the mirrored rail.
     inverses: Vec<[Inverse; 2]>,
     direct: Vec<Vec<Complex64>>,
+    /// Receptances between all nodes, once they are needed.
+    between: OnceLock<Between>,
 }
 
 /// Differences between another track and the known track.
@@ -58,7 +62,17 @@ impl KnownRail {
             direct: direct.into_iter().flatten().collect(),
             frequencies_hz: frequencies_hz.to_vec(),
             model: model.clone(),
+            between: OnceLock::new(),
         }
+    }
+
+    /// As [`receptances_ahead`](super::receptances_ahead) of the known track. The first call takes longer.
+    pub fn ahead(&self, distance_m: f64) -> Vec<Vec<Complex64>> {
+        let compute = || {
+            let inverses = self.inverses.iter().map(|[inverse, _]| inverse);
+            Between::all(&self.model, &self.frequencies_hz, inverses)
+        };
+        self.between.get_or_init(compute).ahead(&self.model, distance_m)
     }
 
     /// Direct receptances of every rail node in m/N, `[frequency][node]`, of a track on the same mesh.

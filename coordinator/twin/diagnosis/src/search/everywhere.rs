@@ -28,7 +28,7 @@ pub(super) fn everywhere<'t>(
     }
     let track = problem.at(typical)?;
     let accepted = problem.extensions(typical)?;
-    let known = forward.transfer(typical, &accepted, false)?;
+    let known = forward.transfer_to_vary(typical, &accepted)?;
     let plain = forward.levels(&known, typical);
     let section = &forward.section;
     let objective = |template: &&'t Template| {
