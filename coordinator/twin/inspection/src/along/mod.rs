@@ -5,18 +5,18 @@
 mod background;
 mod energy;
 mod line;
+mod surface;
 mod tail;
 #[cfg(test)]
 pub(crate) mod testing;
-mod usual_surface;
 
 pub use background::median;
 pub(crate) use background::{Background, hann, whitened};
 pub use energy::separates_wavelengths;
 pub(crate) use energy::{Energy, by_speed, speed_m_s};
 pub(crate) use line::{Line, Ruler, Spectrum, amplitude, on_even_places};
+pub(crate) use surface::Surface;
 pub(crate) use tail::{
     bonferroni, combine_dependent_p_values, ln_binomial_tail, ln_gamma_tail, ln_normal_bound,
     ln_student_tail,
 };
-pub(crate) use usual_surface::UsualSurface;

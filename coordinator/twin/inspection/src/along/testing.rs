@@ -67,7 +67,8 @@ impl Rolled<'_> {
             channel: String::new(),
             passes: [13.0, 13.0, 8.0, 8.0].into_iter().enumerate().map(pass).collect(),
             sleepers: (1..24).map(sleeper).collect(),
-            nominal: serde_json::Map::new(),
+            // No track is under this wheel, from which the size of the surface would follow.
+            nominal: std::iter::once(("gain_known".to_owned(), false.into())).collect(),
             spacing_m: 0.125,
             doubts: Vec::new(),
         }

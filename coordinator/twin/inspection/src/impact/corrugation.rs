@@ -1,7 +1,7 @@
 //! Corrugation: a line with the same wavelength at every speed, on a stretch of rail.
 
 use crate::along::{
-    Background, Line, Ruler, Spectrum, UsualSurface, amplitude, bonferroni, by_speed,
+    Background, Line, Ruler, Spectrum, Surface, amplitude, bonferroni, by_speed,
     combine_dependent_p_values, median, on_even_places, separates_wavelengths, speed_m_s, whitened,
 };
 use rustfft::num_complex::Complex64;
@@ -217,7 +217,7 @@ impl CorrugationSearch<'_> {
         let extent = self.extent(best);
         // The amplitude is that of the stretch itself, not of one that reaches beyond it.
         let length = extent[1] - extent[0];
-        let surface = UsualSurface::of(self.recording);
+        let surface = Surface::of(self.recording);
         let density = surface.density_m3(best.wave_number);
         let amplitude = amplitude(self.ratio(extent, best), density, length);
         let wavelength = 1.0 / best.wave_number;

@@ -2,14 +2,15 @@
 //!
 //! Impact and irregularity pass through the same wheel, contact and track. The ratio of their spectra is
 //! therefore the ratio of their surfaces, `q(f) = |Z(k)|^2 / (pi v S(2 pi k))` with `k = f/v`, for every
-//! track. `S` is eq. B.6; its level scales the depth and not the length.
+//! track.
 
 use super::repeated::ImpactKind;
-use crate::along::{Background, UsualSurface, hann, speed_m_s};
+use crate::along::{Background, Surface, hann, speed_m_s};
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 use tracktwin_signal::recording::{Pass, Recording};
+use tracktwin_track::model::ContactPatch;
 
 /// Examined time in s before and after the first blow; afterwards the track rings.
 const BEFORE_S: f64 = 0.01;
@@ -21,8 +22,14 @@ const BANDS_PER_OCTAVE: f64 = 6.0;
 /// Standard deviation of the logarithm of a band's ratio: difference in power between the track at one
 /// position and the mean track (about 1 dB).
 const MODEL_DEVIATION: f64 = 0.25;
+/// Relative standard deviation of a length that follows from the slope of the surface's spectrum: measured on
+/// ten hollows of two other simulators.
+const LENGTH_DEVIATION: f64 = 0.15;
 /// Smallest number of bands for a shape.
 const BANDS_MIN: usize = 6;
+
+/// Lengths of similar defects, as shares of a form's length.
+const SIMILAR: [f64; 5] = [0.85, 0.92, 1.0, 1.08, 1.18];
 
 /// Form of the surface at an impact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,8 +47,7 @@ pub struct Shape {
     pub form: Form,
     /// Length `l` of the form in m and its standard deviation.
     pub length_m: (f64, f64),
-    /// Depth in m and its standard deviation on the usual surface of the track; proportional to the square
-    /// root of its irregularity level.
+    /// Depth in m and its standard deviation.
     pub depth_m: (f64, f64),
     /// Change of slope at the kink in rad, as the depth: `2 d/l` of a dip. More accurate than depth and
     /// length.
@@ -147,16 +153,24 @@ impl Form {
         }
     }
 
+    /// Mean square of the transform over similar lengths: no defect has exactly this form, and the contact is
+    /// not linear. Nulls are filled.
+    fn square(self, length: f64, wave_number: f64) -> f64 {
+        let squares = SIMILAR.map(|share| self.transform(share * length, wave_number).powi(2));
+        squares.iter().sum::<f64>() / SIMILAR.len() as f64
+    }
+
     /// Shortest and longest length in sleeper spacings: 1.5 mm to 0.1 m for a hollow on V-Track.
     const fn lengths(self) -> [f64; 2] {
         match self {
-            Self::Dip => [0.016, 2.4],
+            Self::Dip => [0.04, 2.4],
             Self::Hollow => [0.012, 0.8],
         }
     }
 }
 
 /// Fit of a form with fixed length: sum of squares, length and depth in m.
+#[derive(Clone)]
 struct Fitted {
     squares: f64,
     length: f64,
@@ -168,9 +182,18 @@ pub(crate) fn fit(recording: &Recording, observed: &[Observed]) -> Option<Shape>
     if observed.iter().map(|seen| seen.bands.len()).sum::<usize>() < BANDS_MIN {
         return None;
     }
-    let surface = UsualSurface::of(recording);
+    let surface = Surface::of(recording);
+    let design = recording.stated_track().track.design;
+    let patch = design.contact_patch_filter.then(|| ContactPatch::new(&design));
     let grid = |form: Form| {
-        grid(form, form.lengths().map(|share| share * recording.spacing_m), observed, &surface)
+        let lengths = form.lengths().map(|share| share * recording.spacing_m);
+        let point = grid(form, lengths, observed, &|k| 1.0 / surface.density_m3(k));
+        // The contact patch averages over short defects, but not in every simulation.
+        let averaged = patch.map_or_else(Vec::new, |patch| {
+            let gain = |k| patch.gain(TAU * k) / surface.density_m3(k);
+            grid(form, lengths, observed, &gain)
+        });
+        [point, averaged].concat()
     };
     let [dip, hollow] = [Form::Dip, Form::Hollow].map(grid);
     let (form, best, other) = if best_of(&dip).squares < best_of(&hollow).squares {
@@ -181,6 +204,7 @@ pub(crate) fn fit(recording: &Recording, observed: &[Observed]) -> Option<Shape>
     let chosen = best_of(&best);
     let (length, length_deviation) = spread(&best, chosen.squares, |fitted| fitted.length);
     let (depth, depth_deviation) = spread(&best, chosen.squares, |fitted| fitted.depth);
+    let length_deviation = length_deviation.hypot(LENGTH_DEVIATION * length);
     let depth_deviation = depth_deviation.hypot(surface.height_deviation * depth);
     Some(Shape {
         form,
@@ -207,12 +231,13 @@ fn spread(grid: &[Fitted], least: f64, quantity: impl Fn(&Fitted) -> f64) -> (f6
     (mean, variance.sqrt().max(0.02 * mean))
 }
 
-/// Fits of all lengths of the form, each with its best depth.
+/// Fits of all lengths of the form, each with its best depth. `gain` is the power that the contact lets pass
+/// at a wave number in cycles/m, over the spectral density of the surface in m3.
 fn grid(
     form: Form,
     [shortest, longest]: [f64; 2],
     observed: &[Observed],
-    surface: &UsualSurface,
+    gain: &dyn Fn(f64) -> f64,
 ) -> Vec<Fitted> {
     const LENGTHS: usize = 120;
     let length_of =
@@ -222,7 +247,7 @@ fn grid(
             .iter()
             .flat_map(|seen| {
                 seen.bands.iter().map(|&(k, q, variance)| {
-                    let unit = 2.0 * form.transform(length, k).powi(2) / surface.density_m3(k);
+                    let unit = 2.0 * form.square(length, k) * gain(k);
                     (q.ln(), unit, seen.floor, variance)
                 })
             })

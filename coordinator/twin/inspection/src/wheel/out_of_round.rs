@@ -5,8 +5,8 @@
 //! begin with the same angle, the orders appear in the passes themselves.
 
 use crate::along::{
-    Line, Ruler, Spectrum, UsualSurface, amplitude, bonferroni, by_speed,
-    combine_dependent_p_values, on_even_places, separates_wavelengths, speed_m_s,
+    Line, Ruler, Spectrum, Surface, amplitude, bonferroni, by_speed, combine_dependent_p_values,
+    on_even_places, separates_wavelengths, speed_m_s,
 };
 use rustfft::num_complex::Complex64;
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -275,7 +275,7 @@ impl OrderSearch<'_> {
         let over_surface = lines.iter().zip(passes).map(|(line, passes)| {
             passes.ratio.max(1.0 + (line.ratio - 1.0) * line.beside / passes.beside)
         });
-        let surface = UsualSurface::of(self.recording);
+        let surface = Surface::of(self.recording);
         let density = surface.density_m3(wave_number);
         let amplitude = amplitude(mean(over_surface), density, self.length());
         (amplitude, surface.height_deviation.hypot(0.25) * amplitude)
