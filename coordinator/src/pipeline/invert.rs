@@ -11,7 +11,7 @@ use tracktwin_diagnosis::{
     first_calibration,
 };
 use tracktwin_evaluation::Flag;
-use tracktwin_inspection::chain;
+use tracktwin_inspection::{Finding, Inspection, inspect};
 use tracktwin_inversion::{Inversion, accepted, sections};
 use tracktwin_library::{Library, LibraryError};
 use tracktwin_parameters::Track;
@@ -48,6 +48,10 @@ pub async fn invert(
     watch: &(dyn Fn(&'static str, f64) + Sync),
 ) -> Result<Inversion, InvertingError> {
     watch("spectra", 0.0);
+    let inspection = compute(|| inspect(recording));
+    let left_out = inspection.misplaced_note(recording);
+    let all_passes = recording.passes.len();
+    let recording = &inspection.placed(recording);
     let prepared = compute(|| sections(recording, track))?;
     let with_physics = |prepared: PreparedRecording| {
         let known = diagnosis.map(|diagnosis| accepted(diagnosis, recording, &prepared));
@@ -65,13 +69,30 @@ pub async fn invert(
     let progress = |done| watch("fit", done as f64 / count);
     let fitted = fitted_sections::of(started, &null, library, &progress).await?;
     let mut inversion = Inversion::of(recording, &fitted);
-    if let Some(lost) = chain::loss_of_contact(recording) {
+    inversion.notes.extend(left_out);
+    if diagnosis.is_none() {
+        inversion.notes.extend(shown(&inspection));
+    }
+    if let Some(lost) = &inspection.loss_of_contact {
         let there = inversion.sleepers.iter_mut().filter(|it| lost.sleepers.contains(&it.id));
         there.for_each(|sleeper| sleeper.flags.push(Flag::LossOfContact));
-        let line = lost.sentence(recording.passes.len());
+        let line = lost.sentence(all_passes);
         inversion.notes.push(format!("loss_of_contact: {line}"));
     }
     Ok(inversion)
+}
+
+/// What the passes alone show, and how to take it into account.
+fn shown(inspection: &Inspection) -> Vec<String> {
+    let mut notes: Vec<String> = inspection.findings.iter().map(Finding::sentence).collect();
+    if !notes.is_empty() {
+        notes.push(
+            "The model of this evaluation does not contain what the passes alone show: values near it may be \
+             wrong. Run `tracktwin improve` to find what was left out and to evaluate with it."
+                .to_owned(),
+        );
+    }
+    notes
 }
 
 /// A section after its first fit.

@@ -30,3 +30,10 @@ pub struct Finding {
     /// Measured quantities as a sentence.
     pub evidence: String,
 }
+
+impl Finding {
+    /// The finding as a sentence.
+    pub fn sentence(&self) -> String {
+        format!("The passes alone show {}: {}.", self.physics, self.evidence)
+    }
+}

@@ -1,7 +1,7 @@
 //! Conclusion from the passes alone, if no track model can be compared with them.
 
 use super::finding::{probability, seen};
-use super::notes::{lost, one_speed, shown};
+use super::notes::{lost, one_speed};
 use super::{ONE_PASS_MAX, ONE_SPEED_MAX, verdict};
 use crate::outcome::{Diagnosis, FORMAT, FitScores, Hypothesis, Levels, Location, Score, Scores};
 use crate::prepared_recording::PreparationError;
@@ -49,7 +49,7 @@ pub fn passes_alone(
     }
     notes.extend(inspection.pass_defects.iter().map(ToString::to_string));
     notes.extend(lost(inspection, recording));
-    notes.extend(inspection.findings.iter().map(shown));
+    notes.extend(inspection.findings.iter().map(Finding::sentence));
     Some(Diagnosis {
         format: FORMAT.to_owned(),
         recording: recording.name.clone(),

@@ -14,7 +14,7 @@ impl Evidence<'_> {
     pub(super) fn notes(&self, hypotheses: &[Hypothesis]) -> Vec<String> {
         let mut notes: Vec<String> =
             self.inspection.pass_defects.iter().map(ToString::to_string).collect();
-        notes.extend(self.not_compared());
+        notes.extend(self.inspection.misplaced_note(self.recording));
         if self.speeds() == 1 {
             notes.push(one_speed(3.6 * self.prepared.forward.speeds_m_s[0]));
         }
@@ -27,21 +27,8 @@ impl Evidence<'_> {
         }
         notes.extend(lost(self.inspection, self.recording));
         notes.extend(self.speed_disagreement().or_else(|| self.remainder(hypotheses)));
-        notes.extend(self.inspection.findings.iter().map(shown));
+        notes.extend(self.inspection.findings.iter().map(Finding::sentence));
         notes
-    }
-
-    /// Note on the passes that were not compared with the track because of their positions.
-    fn not_compared(&self) -> Option<String> {
-        let file = |&pass: &usize| &*self.recording.passes[pass].file;
-        let files: Vec<&str> = self.inspection.misplaced.iter().map(file).collect();
-        (!files.is_empty()).then(|| {
-            format!(
-                "{}: not compared with the track, because their positions differ from those of another \
-                     pass at the same speed.",
-                files.join(", ")
-            )
-        })
     }
 
     /// Note on the significant residual after the last search.
@@ -100,11 +87,6 @@ pub(super) fn lost(inspection: &Inspection, recording: &Recording) -> Option<Str
         "loss_of_contact: {}: estimates near there are unreliable.",
         lost.sentence(recording.passes.len())
     ))
-}
-
-/// A finding as a sentence.
-pub(super) fn shown(finding: &Finding) -> String {
-    format!("The passes alone show {}: {}.", finding.physics, finding.evidence)
 }
 
 pub(super) fn one_speed(speed_km_h: f64) -> String {

@@ -67,6 +67,26 @@ impl Inspection {
         self.flat = None;
     }
 
+    /// The recording without its misplaced passes.
+    pub fn placed(&self, recording: &Recording) -> Recording {
+        let passes = recording.passes.iter().enumerate();
+        let placed = passes.filter(|(pass, _)| !self.misplaced.contains(pass));
+        Recording { passes: placed.map(|(_, pass)| pass.clone()).collect(), ..recording.clone() }
+    }
+
+    /// A note on the passes that are not compared with the track because of their positions.
+    pub fn misplaced_note(&self, recording: &Recording) -> Option<String> {
+        let file = |&pass: &usize| &*recording.passes[pass].file;
+        let files: Vec<&str> = self.misplaced.iter().map(file).collect();
+        (!files.is_empty()).then(|| {
+            format!(
+                "{}: not compared with the track, because their positions differ from those of another \
+                     pass at the same speed.",
+                files.join(", ")
+            )
+        })
+    }
+
     /// The defect that makes the whole recording unusable, if any: a pass without a signal, or passes that
     /// are unrelated to each other or to those at other speeds, unless a position error was found.
     pub fn refusal(&self) -> Option<&PassDefect> {
