@@ -152,7 +152,9 @@ fn gained(fit: &FitScores) -> String {
     if gain <= 0.0 {
         return String::new();
     }
-    format!(" With it, speeds that nothing was fitted to are predicted better by {gain:.0} nats.")
+    format!(
+        " With what was found, the model predicts speeds that it was not fitted to better by {gain:.0} nats."
+    )
 }
 
 fn biased(bias: &BTreeMap<String, BeforeAfter<f64>>) -> String {
@@ -232,8 +234,8 @@ mod tests {
         assert_eq!(
             said,
             "A flat of the wheel's tread, met once a turn (wheel_flat, 99 %). Also: at SN9, 1.12 m: a \
-             railpad is missing or has lost most of its stiffness (missing_railpad, 99 %). With it, \
-             speeds that nothing was fitted to are predicted better by 12 nats."
+             railpad is missing or has lost most of its stiffness (missing_railpad, 99 %). With what \
+             was found, the model predicts speeds that it was not fitted to better by 12 nats."
         );
     }
 
