@@ -186,6 +186,11 @@ impl Transfer {
         self
     }
 
+    /// Factor of the contact patch on the power of a shape, at a wave number in rad/m.
+    pub(crate) fn patch_gain(&self, wave_number_rad_m: f64) -> f64 {
+        self.model.contact_patch().map_or(1.0, |patch| patch.gain(wave_number_rad_m))
+    }
+
     /// Factor of the extensions on the spectral density of the surface, at a wave number in rad/m.
     pub(crate) fn roughness_gain(&self, wave_number_rad_m: f64) -> f64 {
         self.model.roughness_gain(wave_number_rad_m)

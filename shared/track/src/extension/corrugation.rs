@@ -100,6 +100,9 @@ mod tests {
     use crate::extension::testing::{
         assert_felt_alike_in_both_solvers, assert_followed, extension, instance,
     };
+    use crate::model::{ContactPatch, Mesh, Support, TrackModel};
+    use std::f64::consts::TAU;
+    use tracktwin_parameters::Preset;
 
     /// Mean square of the profile from 0.7 m to 0.9 m.
     fn mean_square(bandwidth: f64) -> f64 {
@@ -142,5 +145,22 @@ mod tests {
     fn a_passing_wheel_feels_it_in_both_solvers_alike() {
         let waves = instance("corrugation").with("wavelength_m", 8.5e-3);
         assert_felt_alike_in_both_solvers(&waves.with("amplitude_m", 8e-7));
+    }
+
+    #[test]
+    fn the_contact_patch_of_a_line_averages_it() {
+        let design = Preset::Concrete60E1.design();
+        let waves = instance("corrugation").with("wavelength_m", 0.045).with("amplitude_m", 1e-5);
+        let built = waves.build(&design, 5).unwrap();
+        let supports = vec![Support::from(&Preset::Concrete60E1.track().nominal); 4];
+        let model =
+            TrackModel::build(&design, &Mesh::uniform(5, 2, 2), &supports, &[built]).unwrap();
+        // Over whole waves in the middle.
+        let power = |height_m: &dyn Fn(f64) -> f64| -> f64 {
+            (0..450).map(|point| height_m(1.2 + 1e-3 * f64::from(point)).powi(2)).sum()
+        };
+        let gain = power(&|x_m| model.felt_profile_m(x_m)) / power(&|x_m| model.profile_m(x_m));
+        let expected = ContactPatch::new(&design).gain(TAU / 0.045);
+        assert!(expected < 0.8 && (gain / expected - 1.0).abs() < 0.03, "{gain} {expected}");
     }
 }

@@ -1,6 +1,6 @@
 //! The Hertzian spring between wheel and rail.
 
-use std::f64::consts::FRAC_PI_4;
+use std::f64::consts::{FRAC_PI_4, PI};
 use tracktwin_parameters::TrackDesign;
 
 /// Change of the approach, relative to it, at which Newton's iteration has converged: a few
@@ -75,6 +75,12 @@ impl HertzContact {
 /// 17 dB.
 const AVERAGED: f64 = 4.0;
 
+/// Points per half length of the patch over which a mean is taken, and their reach in half lengths.
+const POINTS_PER_HALF_LENGTH: f64 = 4.0;
+const REACH: f64 = 8.0;
+/// Number of waves for the weights of the points.
+const WAVES: usize = 256;
+
 /// The patch over which wheel and rail touch, which averages the irregularity over its length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactPatch {
@@ -110,11 +116,32 @@ impl ContactPatch {
     pub fn gain(&self, wave_number_rad_m: f64) -> f64 {
         1.0 / (1.0 + FRAC_PI_4 * (wave_number_rad_m * self.half_length_m).powi(3))
     }
+
+    /// Offsets in m and weights of the mean over the patch, whose power response is [`ContactPatch::gain`]; the
+    /// weights sum to one.
+    pub fn weights(&self) -> Vec<(f64, f64)> {
+        let step_m = self.half_length_m / POINTS_PER_HALF_LENGTH;
+        let wave_number_step = PI / step_m / WAVES as f64;
+        let waves: Vec<(f64, f64)> = (0..WAVES)
+            .map(|wave| (wave as f64 + 0.5) * wave_number_step)
+            .map(|wave_number| (wave_number, self.gain(wave_number).sqrt()))
+            .collect();
+        let reach = (REACH * POINTS_PER_HALF_LENGTH) as i32;
+        let weight = |point: i32| {
+            let offset_m = f64::from(point) * step_m;
+            let sum: f64 = waves.iter().map(|(wave, gain)| gain * (wave * offset_m).cos()).sum();
+            (offset_m, sum)
+        };
+        let all: Vec<(f64, f64)> = (-reach..=reach).map(weight).collect();
+        let sum: f64 = all.iter().map(|(_, weight)| weight).sum();
+        all.into_iter().map(|(offset_m, weight)| (offset_m, weight / sum)).collect()
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::TAU;
 
     #[test]
     fn a_wheel_on_a_line_touches_over_a_centimetre() {
@@ -122,6 +149,19 @@ mod tests {
         let design = tracktwin_parameters::Preset::Concrete60E1.design();
         let patch = ContactPatch::new(&design);
         assert!((5e-3..8e-3).contains(&patch.half_length_m), "{patch:?}");
+    }
+
+    #[test]
+    fn the_mean_over_a_patch_has_its_response() {
+        let patch = ContactPatch { half_length_m: 6e-3 };
+        let weights = patch.weights();
+        for wavelength_m in [1.0, 0.1, 0.045, 0.03, 0.02, 0.012] {
+            let wave_number = TAU / wavelength_m;
+            let wave = |(offset_m, weight): &(f64, f64)| weight * (wave_number * offset_m).cos();
+            let mean: f64 = weights.iter().map(wave).sum();
+            let expected = patch.gain(wave_number).sqrt();
+            assert!((mean / expected - 1.0).abs() < 0.02, "{wavelength_m}: {mean} {expected}");
+        }
     }
 
     fn contact() -> HertzContact {

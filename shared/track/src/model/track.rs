@@ -8,7 +8,7 @@ use crate::element::SpringDamper;
 use crate::extension::{Extension, Measured};
 use crate::time;
 use rustfft::num_complex::Complex64;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use tracktwin_parameters::TrackDesign;
 
 /// Rail, sleepers, railpads, ballast and extensions as `M ü + C u̇ + K u = f`.
@@ -26,8 +26,10 @@ pub struct TrackModel {
     matrices: Matrices,
     force_laws: Vec<ForceLaw>,
     vehicle: Vehicle,
-    /// The contact patch that filters the irregularity, if the design has one.
+    /// The contact patch that filters the surface, if the design has one.
     contact_patch: Option<ContactPatch>,
+    /// Offsets in m and weights of the mean over the patch, once they are needed.
+    patch_weights: OnceLock<Vec<(f64, f64)>>,
     /// Distance in m that the first wheel rolled before it reached the origin of the track.
     wheel_turned_m: f64,
     extensions: Vec<Arc<dyn Extension>>,
@@ -94,6 +96,7 @@ impl TrackModel {
             force_laws,
             vehicle,
             contact_patch,
+            patch_weights: OnceLock::new(),
             wheel_turned_m,
             extensions,
         };
@@ -167,6 +170,30 @@ impl TrackModel {
     /// Whether the track is linear: no force laws, and one rigid wheel as the vehicle.
     pub fn is_linear(&self) -> bool {
         self.force_laws.is_empty() && self.vehicle.is_rigid_wheel()
+    }
+
+    /// The contact patch that filters the surface, if the design has one.
+    pub const fn contact_patch(&self) -> Option<ContactPatch> {
+        self.contact_patch
+    }
+
+    /// Height in m, positive downwards, that the shapes of rail and first wheel add for the contact at `x_m`:
+    /// their mean over the contact patch, if the design has one.
+    pub fn felt_profile_m(&self, x_m: f64) -> f64 {
+        self.over_patch(x_m, |x_m| self.profile_m(x_m) + self.wheel_profile_m(x_m))
+    }
+
+    /// As [`TrackModel::felt_profile_m`] for a further wheel, which is round.
+    pub fn felt_rail_profile_m(&self, x_m: f64) -> f64 {
+        self.over_patch(x_m, |x_m| self.profile_m(x_m))
+    }
+
+    fn over_patch(&self, x_m: f64, height_m: impl Fn(f64) -> f64) -> f64 {
+        let Some(patch) = self.contact_patch.filter(|_| !self.extensions.is_empty()) else {
+            return height_m(x_m);
+        };
+        let weights = self.patch_weights.get_or_init(|| patch.weights());
+        weights.iter().map(|(offset_m, weight)| weight * height_m(x_m + offset_m)).sum()
     }
 
     /// Height in m, positive downwards, that extensions add to the surface at `x_m`.

@@ -106,8 +106,7 @@ impl Pass {
     /// Height in m of the surface under the wheel after `step` time steps, with the profiles of
     /// extensions. A ramp of [`RAMP_S`] starts from the height at the first sample.
     pub(super) fn height_m(&self, model: &TrackModel, surface: &Surface, step: usize) -> f64 {
-        let height =
-            |x_m: f64| surface.height(x_m) + model.profile_m(x_m) + model.wheel_profile_m(x_m);
+        let height = |x_m: f64| surface.height(x_m) + model.felt_profile_m(x_m);
         self.eased_in(step, height)
     }
 
@@ -119,14 +118,14 @@ impl Pass {
         step: usize,
         ahead_m: f64,
     ) -> f64 {
-        let height = |x_m: f64| surface.height(x_m + ahead_m) + model.profile_m(x_m + ahead_m);
+        let height =
+            |x_m: f64| surface.height(x_m + ahead_m) + model.felt_rail_profile_m(x_m + ahead_m);
         self.eased_in(step, height)
     }
 
     /// The heights under the first wheel at the start and after every step.
     pub(super) fn heights_m(&self, model: &TrackModel, surface: &Surface) -> Vec<f64> {
-        let height =
-            |x_m: f64| surface.height(x_m) + model.profile_m(x_m) + model.wheel_profile_m(x_m);
+        let height = |x_m: f64| surface.height(x_m) + model.felt_profile_m(x_m);
         let first = height(self.start_m);
         (0..=self.steps()).map(|step| self.eased(step, first, height)).collect()
     }

@@ -284,7 +284,9 @@ impl Forward {
             let lines = weights.iter().zip(&powers);
             let of_line = |(&(line, weight), power): (&(usize, f64), &f64)| {
                 let frequency_hz = self.bands.lines_hz()[line];
-                share(line) * weight * power * shape.density(sleeper, speed_m_s, frequency_hz)
+                let patch = transfer.patch_gain(TAU * frequency_hz / speed_m_s);
+                let density = shape.density(sleeper, speed_m_s, frequency_hz);
+                share(line) * weight * power * patch * density
             };
             lines.map(of_line).sum::<f64>()
         };

@@ -2,8 +2,9 @@
 //!
 //! The passes show how far a defect or a line is above the surface around it. Its size in metres follows from
 //! the size of that surface: `S(k) = v P(f) / |H(f)|^2` with `k = f/v`, the background `P` of a pass, and the
-//! transfer `H` of the stated track (docs/diagnosis.md, eq. 2). `S` is eq. B.6 of the usual level, times a
-//! factor whose logarithm is a parabola over the logarithm of the wave number.
+//! transfer `H` of the stated track (docs/diagnosis.md, eq. 2), and by the gain of the contact patch where the
+//! track has one. `S` is eq. B.6 of the usual level, times a factor whose logarithm is a parabola over the
+//! logarithm of the wave number.
 
 use super::{Background, speed_m_s};
 use nalgebra::{Matrix3, Vector3};
@@ -12,7 +13,7 @@ use std::f64::consts::TAU;
 use tracktwin_parameters::{Parameter, Track};
 use tracktwin_signal::recording::{Pass, Recording};
 use tracktwin_track::frequency::RailReceptances;
-use tracktwin_track::model::{HertzContact, Mesh, Roughness, Support, TrackModel};
+use tracktwin_track::model::{ContactPatch, HertzContact, Mesh, Roughness, Support, TrackModel};
 
 /// Distance between the ends of a uniform distribution, in standard deviations.
 const UNIFORM_WIDTH: f64 = 3.464;
@@ -82,17 +83,22 @@ impl Surface {
         let lines_hz: Vec<f64> =
             (0..=count).map(|line| LOW_HZ * (line as f64 / PER_OCTAVE).exp2()).collect();
         let Some(transfer) = transfer(track, &lines_hz) else { return Vec::new() };
+        let patch = track.design.contact_patch_filter.then(|| ContactPatch::new(&track.design));
         let of_pass = |pass: &Pass| {
             let background = Background::of(&pass.signal)?;
             let (speed, audible_hz) = (speed_m_s(pass), background.audible_hz(AUDIBLE));
             let value = |(hz, power): (f64, f64)| {
                 let wave_number = hz / speed;
-                let density = speed * background.at(hz) / power;
+                let gain = patch.map_or(1.0, |patch| patch.gain(TAU * wave_number));
+                let density = speed * background.at(hz) / power / gain;
                 let ratio = density / self.density_m3(wave_number);
                 ((wave_number / self.middle_per_m).ln(), ratio.ln())
             };
             let usable = lines_hz.iter().copied().zip(transfer.iter().copied());
-            let usable = usable.take_while(|(hz, _)| *hz < audible_hz).map(value);
+            let is_felt = |hz: f64| {
+                hz < audible_hz && !patch.is_some_and(|patch| patch.averages_out(TAU * hz / speed))
+            };
+            let usable = usable.take_while(|(hz, _)| is_felt(*hz)).map(value);
             Some(usable.filter(|(_, ratio)| ratio.is_finite()).collect::<Vec<_>>())
         };
         recording.passes.iter().filter_map(of_pass).flatten().collect()

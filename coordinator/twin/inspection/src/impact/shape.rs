@@ -187,13 +187,13 @@ pub(crate) fn fit(recording: &Recording, observed: &[Observed]) -> Option<Shape>
     let patch = design.contact_patch_filter.then(|| ContactPatch::new(&design));
     let grid = |form: Form| {
         let lengths = form.lengths().map(|share| share * recording.spacing_m);
-        let point = grid(form, lengths, observed, &|k| 1.0 / surface.density_m3(k));
-        // The contact patch averages over short defects, but not in every simulation.
-        let averaged = patch.map_or_else(Vec::new, |patch| {
-            let gain = |k| patch.gain(TAU * k) / surface.density_m3(k);
+        let felt = grid(form, lengths, observed, &|k| 1.0 / surface.density_m3(k));
+        // Where the patch averages the surface, not every simulation averages the defect.
+        let point = patch.map_or_else(Vec::new, |patch| {
+            let gain = |k| 1.0 / patch.gain(TAU * k) / surface.density_m3(k);
             grid(form, lengths, observed, &gain)
         });
-        [point, averaged].concat()
+        [felt, point].concat()
     };
     let [dip, hollow] = [Form::Dip, Form::Hollow].map(grid);
     let (form, best, other) = if best_of(&dip).squares < best_of(&hollow).squares {
