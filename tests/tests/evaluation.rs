@@ -5,7 +5,8 @@
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use system_tests::run;
+use system_tests::{run, simulated};
+use tracktwin_signal::recording::Recording;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 const SAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../coordinator/sample");
@@ -95,4 +96,24 @@ fn gaussian_processes_without_models_are_refused_in_a_line() {
     let answer = run(PROGRAM, &["evaluate", SAMPLE, "--method", "gp", "--out", "nowhere"]);
     assert_eq!(answer.code, Some(2));
     assert!(answer.err.contains("--models"), "{}", answer.err);
+}
+
+#[test]
+fn passes_at_other_positions_than_their_speed_are_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("recording");
+    simulated(PROGRAM, &path, "25", &["13", "10", "7"], "");
+    let mut recording = Recording::open(&path).unwrap();
+    // Of two passes that differ, neither is known to be right.
+    recording.passes[1].position_m.iter_mut().for_each(|x_m| *x_m += 0.04);
+    let files = [0, 1].map(|pass| recording.passes[pass].file.clone());
+    fs::remove_dir_all(&path).unwrap();
+    recording.write(&path).unwrap();
+    let evaluation = evaluated(&path, &folder.path().join("result"));
+    let notes = evaluation["notes"].to_string();
+    assert!(notes.contains("not compared with the track"), "{notes}");
+    assert!(files.iter().all(|file| notes.contains(file)), "{files:?}: {notes}");
+    assert!(notes.contains("The passes alone show position_error"), "{notes}");
+    assert!(!notes.contains("tracktwin improve"), "{notes}");
+    assert_eq!(evaluation["speeds_km_h"].as_array().unwrap().len(), 2);
 }

@@ -16,6 +16,7 @@ use tracktwin_inversion::{Inversion, accepted, sections};
 use tracktwin_library::{Library, LibraryError};
 use tracktwin_parameters::Track;
 use tracktwin_signal::recording::Recording;
+use tracktwin_track::extension::Kind;
 
 /// Errors of the inversion.
 #[derive(Debug, thiserror::Error)]
@@ -82,10 +83,14 @@ pub async fn invert(
     Ok(inversion)
 }
 
-/// What the passes alone show, and how to take it into account.
+/// What the passes alone show, and how to take it into account. The remedy for a fault of the measuring chain is
+/// another recording.
 fn shown(inspection: &Inspection) -> Vec<String> {
     let mut notes: Vec<String> = inspection.findings.iter().map(Finding::sentence).collect();
-    if !notes.is_empty() {
+    let is_physics = |finding: &Finding| {
+        Kind::from_name(finding.physics).is_some_and(|kind| !kind.measuring_chain)
+    };
+    if inspection.findings.iter().any(is_physics) {
         notes.push(
             "The model of this evaluation does not contain what the passes alone show: values near it may be \
              wrong. Run `tracktwin improve` to find what was left out and to evaluate with it."

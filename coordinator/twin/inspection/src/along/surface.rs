@@ -9,7 +9,7 @@
 use super::{Background, speed_m_s};
 use nalgebra::{Matrix3, Vector3};
 use rustfft::num_complex::Complex64;
-use std::f64::consts::TAU;
+use std::f64::consts::{LN_2, TAU};
 use tracktwin_parameters::{Parameter, Track};
 use tracktwin_signal::recording::{Pass, Recording};
 use tracktwin_track::frequency::RailReceptances;
@@ -106,13 +106,10 @@ impl Surface {
 
     /// The surface with the factor that fits these values. Passes count as one: they share their track.
     fn fitted(self, values: &[(f64, f64)]) -> Self {
-        let octaves = |values: &[(f64, f64)]| {
-            let ends = values.iter().fold([f64::MAX, f64::MIN], |[low, high], (place, _)| {
-                [low.min(*place), high.max(*place)]
-            });
-            ((ends[1] - ends[0]) / std::f64::consts::LN_2, ends)
-        };
-        let (octaves, range) = octaves(values);
+        let range = values.iter().fold([f64::MAX, f64::MIN], |[low, high], (place, _)| {
+            [low.min(*place), high.max(*place)]
+        });
+        let octaves = (range[1] - range[0]) / LN_2;
         let weight =
             (octaves * PER_OCTAVE).max(1.0) / values.len() as f64 / VALUE_DEVIATION.powi(2);
         let mut precision = Matrix3::from_diagonal(&Vector3::from(PRIOR.map(|it| it.powi(-2))));
