@@ -5,8 +5,9 @@
 
 use crate::section::Section;
 use rustfft::{Fft, FftPlanner, num_complex::Complex64};
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
+use tracktwin_track::model::ContactPatch;
 
 /// Number of samples per sleeper spacing; the shortest compared wave has more than two samples.
 const SAMPLES_PER_SPACING: usize = 1250;
@@ -26,12 +27,17 @@ pub(crate) struct Shape {
     squares: Vec<Option<Vec<f64>>>,
     step_m: f64,
     spacing_m: f64,
+    patch: Option<ContactPatch>,
 }
 
 impl Shape {
     /// The spectrum of a height in m as a function of the position on the model's track in m; `None` if it
-    /// is flat.
-    pub(crate) fn new(section: &Section, height_m: impl Fn(f64) -> f64) -> Option<Self> {
+    /// is flat. `patch` is the contact patch that averages the shape, if one does.
+    pub(crate) fn new(
+        section: &Section,
+        patch: Option<ContactPatch>,
+        height_m: impl Fn(f64) -> f64,
+    ) -> Option<Self> {
         let spacing_m = section.track.design.sleeper.spacing_m;
         let step_m = spacing_m / SAMPLES_PER_SPACING as f64;
         let transform = FftPlanner::new().plan_fft_forward(SAMPLES);
@@ -40,7 +46,7 @@ impl Shape {
             squares(&transform, step_m, spacing_m, |offset_m| height_m(middle_m + offset_m))
         };
         let squares: Vec<_> = (0..section.sleepers).map(of).collect();
-        squares.iter().any(Option::is_some).then_some(Self { squares, step_m, spacing_m })
+        squares.iter().any(Option::is_some).then_some(Self { squares, step_m, spacing_m, patch })
     }
 
     /// One-sided power spectral density in m2/Hz over a sleeper, at a speed and frequency.
@@ -53,7 +59,8 @@ impl Shape {
         }
         let share = place - left as f64;
         let square = squares[left] * (1.0 - share) + squares[left + 1] * share;
-        2.0 * square / (self.spacing_m * speed_m_s)
+        let gain = self.patch.map_or(1.0, |patch| patch.gain(TAU * frequency_hz / speed_m_s));
+        2.0 * gain * square / (self.spacing_m * speed_m_s)
     }
 }
 
@@ -93,7 +100,6 @@ fn window(spacings: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::f64::consts::TAU;
     use tracktwin_parameters::TrackDesign;
 
     fn section() -> Section {
@@ -104,7 +110,7 @@ mod tests {
     fn a_sine_has_its_power_at_its_own_frequency_over_every_sleeper() {
         let (section, speed, length_m) = (section(), 3.0, 6e-3);
         let sine = |x_m: f64| 1e-6 * (TAU * x_m / length_m).sin();
-        let shape = Shape::new(&section, sine).unwrap();
+        let shape = Shape::new(&section, None, sine).unwrap();
         for sleeper in 0..5 {
             let density = |hz: i32| shape.density(sleeper, speed, f64::from(hz));
             let power: f64 = (0..2000).map(density).sum();
@@ -120,7 +126,7 @@ mod tests {
         let section = section();
         let middle_m = section.model_x_m(0.5 * (section.x_m(1) + section.x_m(2)));
         let hollow = |x_m: f64| 1e-5 * (-((x_m - middle_m) / 2e-3).powi(2)).exp();
-        let shape = Shape::new(&section, hollow).unwrap();
+        let shape = Shape::new(&section, None, hollow).unwrap();
         let (left, right) = (shape.density(1, 3.0, 400.0), shape.density(2, 3.0, 400.0));
         assert!((left / right - 1.0).abs() < 1e-6);
         // The Fourier integral of the Gaussian, shared by two.
@@ -134,6 +140,6 @@ mod tests {
 
     #[test]
     fn a_flat_track_has_no_shape() {
-        assert!(Shape::new(&section(), |_| 0.0).is_none());
+        assert!(Shape::new(&section(), None, |_| 0.0).is_none());
     }
 }

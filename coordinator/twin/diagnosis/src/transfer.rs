@@ -24,8 +24,8 @@ pub(crate) struct Transfer {
     by_seats: Vec<Vec<SeatReceptances>>,
     /// Receptance of the wheel in m/N at each line.
     wheel_receptance: Vec<Complex64>,
-    /// Shape that extensions give the rail, if any.
-    pub(crate) rail: Option<Shape>,
+    /// Shapes that extensions give the rail.
+    pub(crate) rail: Vec<Shape>,
     /// Shape of the wheel in each pass, `[speed][pass]`; empty for a round wheel.
     pub(crate) wheel: Vec<Vec<Shape>>,
     /// Index of each further wheel, and the shape of the rail under it as a function of the first wheel's
@@ -152,7 +152,7 @@ impl Transfer {
             stiffness,
             by_seats,
             wheel_receptance,
-            rail: None,
+            rail: Vec::new(),
             wheel,
             rail_elsewhere: Vec::new(),
             further_wheels,
@@ -173,22 +173,24 @@ impl Transfer {
     pub(crate) fn with_shapes(mut self, section: &Section, starts_m: &[Vec<f64>]) -> Self {
         let model = &self.model;
         let of_pass =
-            |start_m: &f64| Shape::new(section, |x_m| model.wheel_profile_m(x_m - start_m));
+            |start_m: &f64| Shape::new(section, None, |x_m| model.wheel_profile_m(x_m - start_m));
         let of_speed = |starts: &Vec<f64>| starts.iter().map(of_pass).collect();
         let wheel = starts_m.iter().map(of_speed).collect::<Option<_>>().unwrap_or_default();
-        self.rail = Shape::new(section, |x_m| model.profile_m(x_m));
-        let distances_m = model.vehicle().further_wheels_m.iter().enumerate();
-        let under = |(wheel, distance_m): (usize, &f64)| {
-            Some((wheel, Shape::new(section, |x_m| model.profile_m(x_m + distance_m))?))
+        let ahead = |distance_m: f64| {
+            let patch = model.contact_patch();
+            let point = Shape::new(section, None, |x_m| model.point_profile_m(x_m + distance_m));
+            let averaged = patch.and_then(|_| {
+                Shape::new(section, patch, |x_m| model.averaged_profile_m(x_m + distance_m))
+            });
+            point.into_iter().chain(averaged)
         };
-        self.rail_elsewhere = distances_m.filter_map(under).collect();
+        self.rail = ahead(0.0).collect();
+        let distances_m = model.vehicle().further_wheels_m.iter().enumerate();
+        let under =
+            |(wheel, &distance_m): (usize, &f64)| ahead(distance_m).map(move |it| (wheel, it));
+        self.rail_elsewhere = distances_m.flat_map(under).collect();
         self.wheel = wheel;
         self
-    }
-
-    /// Factor of the contact patch on the power of a shape, at a wave number in rad/m.
-    pub(crate) fn patch_gain(&self, wave_number_rad_m: f64) -> f64 {
-        self.model.contact_patch().map_or(1.0, |patch| patch.gain(wave_number_rad_m))
     }
 
     /// Factor of the extensions on the spectral density of the surface, at a wave number in rad/m.

@@ -82,6 +82,10 @@ impl Corrugation {
 }
 
 impl Extension for Corrugation {
+    fn is_averaged(&self) -> bool {
+        true
+    }
+
     fn profile_m(&self, x_m: f64) -> f64 {
         let wave = |(index, wave_number): (usize, &f64)| {
             (wave_number * x_m + TAU * PHASE_STEP * index as f64).sin()

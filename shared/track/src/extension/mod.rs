@@ -71,6 +71,12 @@ pub trait Extension: Debug + Send + Sync {
         0.0
     }
 
+    /// Whether the contact patch of a track averages the profile, as it averages the irregularity. The blow at
+    /// a kink is not linear and has the high frequencies that the patch would take from the profile.
+    fn is_averaged(&self) -> bool {
+        false
+    }
+
     /// Height in m that the shape of the wheel adds, positive downwards: a flat is positive. `rolled_m`
     /// is the distance that the wheel has rolled from the origin of the track.
     fn wheel_profile_m(&self, _rolled_m: f64) -> f64 {

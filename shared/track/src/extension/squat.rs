@@ -54,6 +54,10 @@ struct Squat {
 }
 
 impl Extension for Squat {
+    fn is_averaged(&self) -> bool {
+        true
+    }
+
     fn profile_m(&self, x_m: f64) -> f64 {
         let place = (x_m - self.centre_m) / self.length_m;
         if place.abs() < 0.5 { 0.5 * self.depth_m * (1.0 + (TAU * place).cos()) } else { 0.0 }

@@ -177,23 +177,37 @@ impl TrackModel {
         self.contact_patch
     }
 
-    /// Height in m, positive downwards, that the shapes of rail and first wheel add for the contact at `x_m`:
-    /// their mean over the contact patch, if the design has one.
+    /// Height in m, positive downwards, that the shapes of rail and first wheel add for the contact at `x_m`.
     pub fn felt_profile_m(&self, x_m: f64) -> f64 {
-        self.over_patch(x_m, |x_m| self.profile_m(x_m) + self.wheel_profile_m(x_m))
+        self.felt_rail_profile_m(x_m) + self.wheel_profile_m(x_m)
     }
 
-    /// As [`TrackModel::felt_profile_m`] for a further wheel, which is round.
+    /// As [`TrackModel::felt_profile_m`] for a further wheel, which is round: the profile of the rail, with the
+    /// part that the contact patch averages as its mean over the patch.
     pub fn felt_rail_profile_m(&self, x_m: f64) -> f64 {
-        self.over_patch(x_m, |x_m| self.profile_m(x_m))
-    }
-
-    fn over_patch(&self, x_m: f64, height_m: impl Fn(f64) -> f64) -> f64 {
+        let point_m = self.point_profile_m(x_m);
         let Some(patch) = self.contact_patch.filter(|_| !self.extensions.is_empty()) else {
-            return height_m(x_m);
+            return point_m;
         };
         let weights = self.patch_weights.get_or_init(|| patch.weights());
-        weights.iter().map(|(offset_m, weight)| weight * height_m(x_m + offset_m)).sum()
+        let at = |(offset_m, weight): &(f64, f64)| weight * self.averaged_profile_m(x_m + offset_m);
+        point_m + weights.iter().map(at).sum::<f64>()
+    }
+
+    /// Part of [`TrackModel::profile_m`] that the contact patch averages; zero without a patch.
+    pub fn averaged_profile_m(&self, x_m: f64) -> f64 {
+        let averaged = self.extensions.iter().filter(|extension| self.averages(extension));
+        averaged.map(|extension| extension.profile_m(x_m)).sum()
+    }
+
+    /// The other part of [`TrackModel::profile_m`].
+    pub fn point_profile_m(&self, x_m: f64) -> f64 {
+        let others = self.extensions.iter().filter(|extension| !self.averages(extension));
+        others.map(|extension| extension.profile_m(x_m)).sum()
+    }
+
+    fn averages(&self, extension: &Arc<dyn Extension>) -> bool {
+        self.contact_patch.is_some() && extension.is_averaged()
     }
 
     /// Height in m, positive downwards, that extensions add to the surface at `x_m`.

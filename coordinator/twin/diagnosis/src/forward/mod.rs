@@ -271,7 +271,7 @@ impl Forward {
         band: usize,
     ) -> Vec<f64> {
         let wheel = transfer.wheel.get(speed).map_or(&[][..], Vec::as_slice);
-        if transfer.rail.is_none() && transfer.rail_elsewhere.is_empty() && wheel.is_empty() {
+        if transfer.rail.is_empty() && transfer.rail_elsewhere.is_empty() && wheel.is_empty() {
             return vec![0.0];
         }
         let weights = self.bands.weights(band);
@@ -284,9 +284,7 @@ impl Forward {
             let lines = weights.iter().zip(&powers);
             let of_line = |(&(line, weight), power): (&(usize, f64), &f64)| {
                 let frequency_hz = self.bands.lines_hz()[line];
-                let patch = transfer.patch_gain(TAU * frequency_hz / speed_m_s);
-                let density = shape.density(sleeper, speed_m_s, frequency_hz);
-                share(line) * weight * power * patch * density
+                share(line) * weight * power * shape.density(sleeper, speed_m_s, frequency_hz)
             };
             lines.map(of_line).sum::<f64>()
         };
@@ -295,7 +293,7 @@ impl Forward {
         let power_elsewhere = |(wheel, shape): &(usize, Shape)| {
             power(shape, &|line| further.share(*wheel, line, seat_node))
         };
-        let rail = transfer.rail.as_ref().map_or(0.0, |shape| power(shape, &own))
+        let rail = transfer.rail.iter().map(|shape| power(shape, &own)).sum::<f64>()
             + transfer.rail_elsewhere.iter().map(power_elsewhere).sum::<f64>();
         if wheel.is_empty() {
             return vec![rail];

@@ -157,7 +157,7 @@ fn a_squat_under_the_other_wheel_is_felt_as_in_time() {
         });
         let own = sum(&|line| {
             let share = transfer.further_wheels().own_share(line, section.seat_node(4));
-            power(line, 4, transfer.rail.as_ref().unwrap(), share)
+            power(line, 4, &transfer.rail[0], share)
         });
         10.0 * (other / own).log10()
     });
