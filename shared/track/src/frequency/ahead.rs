@@ -34,8 +34,10 @@ pub(super) struct Between {
 }
 
 impl Between {
-    /// Between all nodes of a model with these inverses, one for each group of frequencies. On one thread:
-    /// who waits for the result in a parallel task may hold the others.
+    /// Between all nodes of a model with these inverses, one for each group of frequencies.
+    ///
+    /// It runs on one thread. With parallel work in it, its thread could begin another task that waits for
+    /// the same result.
     pub(super) fn all<'a>(
         model: &TrackModel,
         frequencies_hz: &[f64],

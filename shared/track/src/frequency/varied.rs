@@ -29,7 +29,7 @@ pub struct KnownRail {
     /// For each group of frequencies, the inverse of the rail and that of the mirrored rail.
     inverses: Vec<[Inverse; 2]>,
     direct: Vec<Vec<Complex64>>,
-    /// Receptances between all nodes, once they are needed.
+    /// Receptances between all nodes, computed when they are first needed.
     between: OnceLock<Between>,
 }
 

@@ -28,7 +28,7 @@ pub struct TrackModel {
     vehicle: Vehicle,
     /// The contact patch that filters the surface, if the design has one.
     contact_patch: Option<ContactPatch>,
-    /// Offsets in m and weights of the mean over the patch, once they are needed.
+    /// Offsets in m and weights of the mean over the patch, computed when they are first needed.
     patch_weights: OnceLock<Vec<(f64, f64)>>,
     /// Distance in m that the first wheel rolled before it reached the origin of the track.
     wheel_turned_m: f64,
