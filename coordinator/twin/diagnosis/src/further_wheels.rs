@@ -25,8 +25,8 @@ pub(crate) struct FurtherWheels {
 impl FurtherWheels {
     /// Computes the effect for a model's wheels. `hertz` is the contact stiffness in N/m, `direct` the
     /// receptance of the rail in m/N, and `stiffness` that of contact, rail and vehicle in series in N/m,
-    /// both `[line][node]`. `ahead` gives the
-    /// receptances of the rail at a distance in m, as [`receptances_ahead`](tracktwin_track::frequency::receptances_ahead).
+    /// both `[line][node]`. `ahead` gives the receptances of the rail at a distance in m, as
+    /// [`receptances_ahead`](tracktwin_track::frequency::receptances_ahead).
     pub(crate) fn new(
         model: &TrackModel,
         lines_hz: &[f64],

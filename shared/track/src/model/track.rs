@@ -186,9 +186,8 @@ impl TrackModel {
     /// part that the contact patch averages as its mean over the patch.
     pub fn felt_rail_profile_m(&self, x_m: f64) -> f64 {
         let point_m = self.point_profile_m(x_m);
-        let Some(patch) = self.contact_patch.filter(|_| !self.extensions.is_empty()) else {
-            return point_m;
-        };
+        let has_averaged = self.extensions.iter().any(|extension| self.averages(extension));
+        let Some(patch) = self.contact_patch.filter(|_| has_averaged) else { return point_m };
         let weights = self.patch_weights.get_or_init(|| patch.weights());
         let at = |(offset_m, weight): &(f64, f64)| weight * self.averaged_profile_m(x_m + offset_m);
         point_m + weights.iter().map(at).sum::<f64>()
