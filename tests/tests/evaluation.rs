@@ -117,4 +117,6 @@ fn passes_at_other_positions_than_their_speed_are_left_out() {
     assert!(!notes.contains("tracktwin improve"), "{notes}");
     let speeds = evaluation["provenance"]["speeds_km_h"].as_array().unwrap();
     assert_eq!(speeds.len(), 2);
+    let page = fs::read_to_string(folder.path().join("result/report.html")).unwrap();
+    assert!(page.contains("evaluated by inversion from 4 passes at 7, 10 km/h"));
 }

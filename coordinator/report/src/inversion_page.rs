@@ -43,7 +43,7 @@ pub fn inversion_page(
         h2 { "Provenance" }
         (provenance(inversion, command))
     };
-    page(&format!("Track under {}", inversion.recording), &summary(inversion, recording), &body)
+    page(&format!("Track under {}", inversion.recording), &summary(inversion), &body)
 }
 
 /// Returns the charts along the track, one below the other, as an SVG file.
@@ -78,12 +78,12 @@ fn banner(inversion: &Inversion) -> Markup {
 }
 
 /// Summary in one sentence.
-fn summary(inversion: &Inversion, recording: &Recording) -> String {
+fn summary(inversion: &Inversion) -> String {
     let speeds: Vec<String> =
         inversion.provenance.speeds_km_h.iter().map(|speed| rounded(*speed, 3)).collect();
     let ranges: Vec<String> = PER_SLEEPER.iter().filter_map(|&of| range(inversion, of)).collect();
     let ranges = if ranges.is_empty() { "no valid estimate".to_owned() } else { ranges.join(", ") };
-    let passes = recording.passes.len();
+    let passes: usize = inversion.provenance.passes.iter().sum();
     format!(
         "{} sleepers evaluated by inversion from {passes} {} at {} km/h: {ranges}.",
         inversion.sleepers.len(),
