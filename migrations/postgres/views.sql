@@ -98,7 +98,8 @@ select
     result.finished_at,
     result.flagged,
     result.contact_loss_share,
-    result.checksum
+    result.checksum,
+    campaign_case.drawn
 from result
 join campaign_case using (campaign_id, sobol_index);
 
@@ -161,4 +162,4 @@ select
 from progress
 group by campaign_id, from_unix_s;
 
-comment on view campaign_status is 'views of version 1';
+comment on view campaign_status is 'views of version 2';

@@ -51,7 +51,8 @@ select
     result.finished_at,
     result.flagged,
     result.contact_loss_share,
-    result.checksum
+    result.checksum,
+    campaign_case.drawn
 from result
 join campaign_case using (campaign_id, sobol_index);
 
@@ -155,4 +156,4 @@ select
 from progress
 group by campaign_id, from_unix_s;
 
-pragma user_version = 1;
+pragma user_version = 2;

@@ -120,3 +120,39 @@ fn passes_at_other_positions_than_their_speed_are_left_out() {
     let page = fs::read_to_string(folder.path().join("result/report.html")).unwrap();
     assert!(page.contains("evaluated by inversion from 4 passes at 7, 10 km/h"));
 }
+
+#[test]
+fn rails_are_never_mixed_and_one_of_them_is_selected() {
+    let folder = tempfile::tempdir().unwrap();
+    for entry in fs::read_dir(SAMPLE).unwrap() {
+        let path = entry.unwrap().path();
+        fs::copy(&path, folder.path().join(path.file_name().unwrap())).unwrap();
+    }
+    let manifest = folder.path().join("recording.json");
+    let mut stated: Value = serde_json::from_str(&fs::read_to_string(&manifest).unwrap()).unwrap();
+    for (pass, rail) in
+        stated["passes"].as_array_mut().unwrap().iter_mut().zip(["left", "right", "left"])
+    {
+        pass["rail"] = rail.into();
+        pass["axle"] = 1.into();
+    }
+    fs::write(&manifest, stated.to_string()).unwrap();
+    let recording = folder.path().display().to_string();
+    let inspected =
+        |options: &[&str]| run(PROGRAM, &[&["inspect", &recording, "--json"], options].concat());
+    let refused = inspected(&[]);
+    assert_eq!(refused.code, Some(2));
+    assert!(
+        refused.err.contains("left, right") && refused.err.contains("--rail"),
+        "{}",
+        refused.err
+    );
+    let refused = inspected(&["--rail", "left", "--axle", "2"]);
+    assert!(refused.err.contains("axle `2`; known are: 1"), "{}", refused.err);
+    let of_rail = |rail: &str| -> Value {
+        serde_json::from_str(&inspected(&["--rail", rail]).succeeded()).unwrap()
+    };
+    let passes = |inspection: &Value| inspection["passes"].as_u64().unwrap();
+    assert_eq!([passes(&of_rail("left")), passes(&of_rail("right"))], [2, 1]);
+    assert!(of_rail("left")["recording"].as_str().unwrap().ends_with(" rail left"));
+}

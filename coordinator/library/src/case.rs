@@ -5,7 +5,7 @@ use crate::engine::{Connection, Row, Statement, Write, sql};
 use crate::{Cell, Library, LibraryError, State};
 use tracktwin_parameters::{Case, Parameter, ParameterSet};
 
-/// Maximum number of cases in one statement. Each has ten values, and `SQLite` accepts 32,766 values.
+/// Maximum number of cases in one statement. Each has eleven values, and `SQLite` accepts 32,766 values.
 const CASES_A_STATEMENT: usize = 1000;
 
 /// A case and its state.
@@ -49,13 +49,20 @@ impl Status {
 }
 
 impl Library {
-    /// Adds cases to a campaign. Existing cases are kept unchanged.
+    /// Adds cases to a campaign. Existing cases are kept unchanged. `drawn` returns what was drawn for a
+    /// case besides its parameters, as a JSON object of numbers by name.
     ///
     /// # Errors
     /// Returns [`LibraryError::SeedTooLarge`], or an error if the library cannot be written.
-    pub async fn insert_cases(&self, campaign: &str, cases: &[Case]) -> Result<(), LibraryError> {
+    pub async fn insert_cases(
+        &self,
+        campaign: &str,
+        cases: &[Case],
+        drawn: impl Fn(&Case) -> Option<String>,
+    ) -> Result<(), LibraryError> {
         for chunk in cases.chunks(CASES_A_STATEMENT) {
-            self.write(Insert { campaign: campaign.to_owned(), cases: chunk.to_vec() }).await?;
+            let cases = chunk.iter().map(|case| (case.clone(), drawn(case))).collect();
+            self.write(Insert { campaign: campaign.to_owned(), cases }).await?;
         }
         Ok(())
     }
@@ -192,7 +199,7 @@ fn record(row: &Row) -> Result<CaseRecord, LibraryError> {
 
 struct Insert {
     campaign: String,
-    cases: Vec<Case>,
+    cases: Vec<(Case, Option<String>)>,
 }
 
 impl Write for Insert {
@@ -203,15 +210,16 @@ impl Write for Insert {
             Parameter::ALL.iter().flat_map(|parameter| [parameter.name(), ", "]).collect();
         let insert = format!(
             "insert into campaign_case (campaign_id, sobol_index, {parameters}surface_seed,
-                parameter_hash)
+                parameter_hash, drawn)
             values {} on conflict (campaign_id, sobol_index) do nothing",
-            connection.dialect().rows_of_values(self.cases.len(), Parameter::ALL.len() + 4)
+            connection.dialect().rows_of_values(self.cases.len(), Parameter::ALL.len() + 5)
         );
         let mut insert = sql(insert);
-        for case in &self.cases {
+        for (case, drawn) in &self.cases {
             insert = insert.bind(&self.campaign).bind(case.index);
             insert = case.parameters.values().iter().fold(insert, |it, &value| it.bind(value));
             insert = insert.bind(sql_seed(case.surface_seed)?).bind(case.parameter_hash());
+            insert = insert.bind(drawn.clone());
         }
         connection.execute(insert).await.map(drop)
     }

@@ -3,6 +3,7 @@
 use super::files::{Force, check, make_folder};
 use super::library_url::{open_or_create, open_whole};
 use super::progress::SectionStages;
+use super::recording::RecordingArgument;
 use super::track::TrackOption;
 use super::{OrInput, Stop, print_json, println_stderr, println_stdout};
 use crate::pipeline;
@@ -10,6 +11,7 @@ use crate::pipeline::diagnose::Setting;
 use crate::pipeline::diagnose_sections::{
     At, DIAGNOSIS, PAGE, SectionOutput, SectionsError, add_to, diagnose_sections,
 };
+use crate::pipeline::evaluate::design_for;
 use crate::pipeline::provenance;
 use anyhow::Context;
 use clap::Args;
@@ -43,8 +45,8 @@ Next: `tracktwin extend CAMPAIGN.toml --from diagnosis/diagnosis.json`
 Exit codes: 0 consistent, 1 left-out physics or a measuring-chain fault was found, 2 wrong input,
 3 failure.")]
 pub(super) struct Arguments {
-    /// The recording: a folder with `recording.json` and one file per pass.
-    recording: PathBuf,
+    #[command(flatten)]
+    recording: RecordingArgument,
     /// Folder of trained models, written by `train` or `run`; their campaign defines the track.
     #[arg(long, value_name = "DIR", requires = "library", conflicts_with = "track")]
     models: Option<PathBuf>,
@@ -74,7 +76,7 @@ pub(super) struct Arguments {
 impl Arguments {
     /// A diagnosis of a recording, with a library for null simulations.
     pub(super) fn of(
-        recording: &Path,
+        recording: &RecordingArgument,
         library: &str,
         out: &Path,
         track: &TrackOption,
@@ -82,7 +84,7 @@ impl Arguments {
         confirm: bool,
     ) -> Self {
         Self {
-            recording: recording.to_owned(),
+            recording: recording.clone(),
             models: None,
             library: Some(library.to_owned()),
             out: out.to_owned(),
@@ -104,7 +106,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let origin = origin(&arguments);
     let Arguments { recording, models, library, track, out, force, confirm, without, json } =
         arguments;
-    let recording = Recording::open(&recording).or_input()?;
+    let recording = recording.open().or_input()?;
     check(&out, Kind::Results, force, &[PAGE, DIAGNOSIS])?;
     recording.doubts.iter().for_each(|doubt| println_stderr(doubt));
     let library = match library {
@@ -113,7 +115,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         Some(url) => Some(open_or_create(&url).await?),
         None => None,
     };
-    let (track, mut assumed) = match of_models(models, library.as_ref()).await? {
+    let (track, mut assumed) = match of_models(models, library.as_ref(), &recording).await? {
         Some(track) => (track, Vec::new()),
         None => track.of(&recording)?,
     };
@@ -212,7 +214,7 @@ fn stop(error: SectionsError) -> Stop {
 /// Provenance of the diagnosis, with the command that repeats it.
 fn origin(arguments: &Arguments) -> Origin {
     let Arguments { recording, models, library, track, out, confirm, without, .. } = arguments;
-    let mut command = vec![format!("tracktwin diagnose {}", recording.display())];
+    let mut command = vec![format!("tracktwin diagnose {}", recording.typed())];
     command.extend(models.as_ref().map(|models| format!("--models {}", models.display())));
     let track = track.track.as_ref();
     command.extend(track.map(|file| format!("--track {}", file.display())));
@@ -237,10 +239,11 @@ fn uncalibrated(track: &Track) -> Option<String> {
     })
 }
 
-/// Track of the models' campaign; `None` without models.
+/// Track of the models' campaign that is most similar to that of the recording; `None` without models.
 async fn of_models(
     models: Option<PathBuf>,
     library: Option<&Library>,
+    recording: &Recording,
 ) -> Result<Option<Track>, Stop> {
     let (Some(models), Some(library)) = (models, library) else {
         return Ok(None);
@@ -253,5 +256,6 @@ async fn of_models(
             "the models belong to another library; give their library, or train models on this one",
         )
         .or_input()?;
-    Ok(Some(Track::of(pipeline::train::experiment(&campaign).or_input()?.design)))
+    let experiment = pipeline::train::experiment(&campaign).or_input()?;
+    Ok(Some(Track::of(design_for(&experiment, recording))))
 }

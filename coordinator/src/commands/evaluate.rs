@@ -4,6 +4,7 @@ use super::accepted::{diagnosis_of, with_physics};
 use super::files::{Force, check, make_folder};
 use super::library_url::{open_or_create, open_whole};
 use super::progress::Stages;
+use super::recording::{Channel, RecordingArgument};
 use super::track::TrackOption;
 use super::{OrInput, Stop, print_json, println_stderr, println_stdout};
 use crate::pipeline::evaluate::{Evaluator, EvaluatorError};
@@ -52,8 +53,8 @@ page also shows the inversion; --method selects one of the two.
 Exit codes: 0 done, 1 done, but the estimates of most sleepers are not valid (see the last lines of
 the output), 2 wrong input, 3 failure.")]
 pub(super) struct Arguments {
-    /// The recording: a folder with `recording.json` and one file per pass.
-    recording: PathBuf,
+    #[command(flatten)]
+    recording: RecordingArgument,
     /// Method [default: inversion; both with --models].
     #[arg(long, value_enum)]
     method: Option<Method>,
@@ -92,7 +93,7 @@ pub(super) struct Arguments {
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let Arguments { recording, method, models, library, track, from, out, force, json } = arguments;
     // Read the recording first: it is the most frequent cause of errors and the quickest to check.
-    let recording = open(&recording)?;
+    let recording = open(recording.folder(), recording.channel())?;
     check_files(&out, force)?;
     let (Some(models), Some(library)) =
         (models.filter(|_| method != Some(Method::Inversion)), library.as_deref())
@@ -226,9 +227,9 @@ fn inversion_summary(inversion: &Inversion, folder: &Path) -> Value {
     })
 }
 
-/// Reads the recording in a folder.
-pub(super) fn open(folder: &Path) -> Result<Recording, Stop> {
-    let recording = Recording::open(folder).or_input()?;
+/// Reads the passes of a channel of the recording in a folder.
+pub(super) fn open(folder: &Path, channel: &Channel) -> Result<Recording, Stop> {
+    let recording = channel.open(folder).or_input()?;
     check_sleepers(folder, &recording)?;
     usable(&recording)?;
     Ok(recording)
@@ -277,7 +278,8 @@ pub(super) async fn evaluate(
 ) -> Result<Evaluation, Stop> {
     let evaluator = Evaluator::new(models, library).await.map_err(stop)?;
     let (recording, notes) = usable_with_notes(recording)?;
-    check_recording(&recording, evaluator.design(), &evaluator.set().speeds_km_h).or_input()?;
+    let design = evaluator.design_for(&recording);
+    check_recording(&recording, &design, &evaluator.set().speeds_km_h).or_input()?;
     make_folder(folder)?;
     let mut evaluation = evaluator.evaluate(&recording).or_input()?;
     let outside = evaluation.outside_library.sentences();
@@ -286,7 +288,7 @@ pub(super) async fn evaluate(
         .iter()
         .filter(|note| !outside.contains(note))
         .for_each(|it| println_stderr(it));
-    evaluation.notes.splice(0..0, notes);
+    evaluation.notes.splice(0..0, notes.into_iter().chain(evaluator.varied_design()));
     if let Some(lost) = chain::loss_of_contact(&recording) {
         flag(&mut evaluation, &lost, recording.passes.len());
     }
@@ -314,7 +316,7 @@ async fn invert_beside(
     setting: Setting<'_>,
     evaluation: &mut Evaluation,
 ) -> Option<Inversion> {
-    match invert(recording, &Track::of(evaluator.design().clone()), setting).await {
+    match invert(recording, &Track::of(evaluator.design_for(recording)), setting).await {
         Ok(mut inversion) => {
             inversion.notes.splice(0..0, setting.diagnosis.map(with_physics));
             Some(inversion)

@@ -2,6 +2,7 @@
 
 use super::files::{Force, check, make_folder, read, write_file};
 use super::numbers::{cores, count};
+use super::recording::RecordingArgument;
 use super::track::TrackOption;
 use super::{
     OrInput, Stop, diagnose, evaluate, extend, println_stderr, println_stdout, run as campaign,
@@ -44,8 +45,8 @@ command to continue an interrupted campaign.
 Exit codes: 0 done, or nothing was left out; 1 what was found belongs in no campaign, or withheld
 passes do not confirm it; 2 wrong input; 3 failure or interruption.")]
 pub(super) struct Arguments {
-    /// The recording: a folder with `recording.json` and one file per pass.
-    recording: PathBuf,
+    #[command(flatten)]
+    recording: RecordingArgument,
     /// Output folder.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -66,8 +67,8 @@ pub(super) struct Arguments {
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
-    let Arguments { recording: path, out, library, track, cases, cores, force } = arguments;
-    let recording = Recording::open(&path).or_input()?;
+    let Arguments { recording: argument, out, library, track, cases, cores, force } = arguments;
+    let recording = argument.open().or_input()?;
     check(&out, Kind::Results, force, &RESULTS)?;
     make_folder(&out)?;
     let library = library.unwrap_or_else(|| campaign::default_library(&out));
@@ -81,7 +82,8 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     println_stderr("1 of 4: diagnosis");
     let confirm = has_pass_to_withhold(&recording);
     let folder = out.join("diagnosis");
-    let of_recording = diagnose::Arguments::of(&path, &library, &folder, &track, force, confirm);
+    let of_recording =
+        diagnose::Arguments::of(&argument, &library, &folder, &track, force, confirm);
     match diagnose::run(of_recording).await {
         Ok(()) => return Ok(()),
         Err(Stop::Negative) => {}
@@ -97,7 +99,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
 
     println_stderr("2 of 4: campaign of the track without what was found");
     let evaluated = |campaign: PathBuf, out: PathBuf, diagnosis: Option<PathBuf>| {
-        campaign::Arguments::of(campaign, &path, &library, out, cores, force, diagnosis)
+        campaign::Arguments::of(campaign, &argument, &library, out, cores, force, diagnosis)
     };
     simulate(evaluated(plain.clone(), out.join(FOLDERS[0]), None)).await?;
 

@@ -1,6 +1,7 @@
 //! `tracktwin inspect`: content and quality of a recording.
 
 use super::files::{Force, check_file, write_file};
+use super::recording::RecordingArgument;
 use super::{OrInput, Stop, print_json, println_stdout};
 use clap::Args;
 use std::path::PathBuf;
@@ -27,8 +28,8 @@ Example:
 
 Exit codes: 0 done, also if there are defects; 2 wrong input; 3 failure.")]
 pub(super) struct Arguments {
-    /// The recording: a folder with `recording.json` and one file per pass.
-    recording: PathBuf,
+    #[command(flatten)]
+    recording: RecordingArgument,
     /// Output page (HTML) with plots.
     #[arg(long, value_name = "FILE.html")]
     out: Option<PathBuf>,
@@ -40,7 +41,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
-    let recording = Recording::open(&arguments.recording).or_input()?;
+    let recording = arguments.recording.open().or_input()?;
     if let Some(path) = &arguments.out {
         check_file(path, Kind::Results, arguments.force)?;
     }

@@ -26,6 +26,7 @@ mod new;
 mod numbers;
 mod progress;
 mod receptance;
+mod recording;
 mod reproduce;
 mod ring;
 mod run;

@@ -40,7 +40,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     let text = match (preset, from) {
         (Some(preset), _) => preset.text(),
         (None, Some(from)) => {
-            let (track, notes) = stated(&Recording::open(from).or_input()?);
+            let (track, notes) = stated(&Recording::without_passes(from).or_input()?);
             for note in &notes {
                 println_stderr(note);
             }

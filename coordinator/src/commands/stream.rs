@@ -92,7 +92,8 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let library = library.open_whole().await?;
     let models = load_models(&models)?;
     let evaluator = Evaluator::new(models, &library).await.map_err(super::evaluate::stop)?;
-    check_recording(&section, evaluator.design(), &evaluator.set().speeds_km_h).or_input()?;
+    let design = evaluator.design_for(&section);
+    check_recording(&section, &design, &evaluator.set().speeds_km_h).or_input()?;
     let mut rows = Rows::open(to.as_deref())?;
     let streamed = compute(|| -> Result<Streamed, Stop> {
         let stream = evaluator.stream(&section).or_input()?;

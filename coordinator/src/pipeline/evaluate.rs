@@ -5,7 +5,7 @@ use crate::pipeline::train::TrainingError;
 use tracktwin_evaluation::{BySpeeds, Error, Evaluation, Stream, Twin};
 use tracktwin_experiment::Experiment;
 use tracktwin_library::{Library, LibraryError};
-use tracktwin_parameters::{ParameterSet, TrackDesign};
+use tracktwin_parameters::{DesignAxis, ParameterSet, TrackDesign};
 use tracktwin_signal::recording::Recording;
 use tracktwin_signal::{Extractor, FeatureError};
 use tracktwin_surrogate::{Trained, TrainingSet};
@@ -19,6 +19,12 @@ pub struct Evaluator {
     by_speeds: BySpeeds,
     experiment: Experiment,
     fixed: ParameterSet,
+}
+
+/// Design of the track of an experiment that is most similar to that of a recording: varied numbers have the
+/// value that the recording states, if it lies in their range.
+pub fn design_for(experiment: &Experiment, recording: &Recording) -> TrackDesign {
+    experiment.design_like(&recording.stated_track().track.design)
 }
 
 /// Reasons for not creating an evaluator.
@@ -63,9 +69,31 @@ impl Evaluator {
         &self.set
     }
 
-    /// Design of the track in the models' campaign.
+    /// Design of the track in the models' campaign. Varied numbers have the value of the campaign's
+    /// description.
     pub const fn design(&self) -> &TrackDesign {
         &self.experiment.design
+    }
+
+    /// Design of the track in the models' campaign that is most similar to that of a recording.
+    pub fn design_for(&self, recording: &Recording) -> TrackDesign {
+        design_for(&self.experiment, recording)
+    }
+
+    /// The numbers of the description that differ in the library, as a note. `None` if there are none.
+    pub fn varied_design(&self) -> Option<String> {
+        let range = |axis: &DesignAxis| {
+            let DesignAxis { number, low, high, .. } = axis;
+            format!("{} {low} to {high} {}", number.key(), number.unit()).trim_end().to_owned()
+        };
+        let ranges: Vec<_> = self.experiment.design_axes.iter().map(range).collect();
+        (!ranges.is_empty()).then(|| {
+            format!(
+                "the models do not know which value these numbers of the description have; their intervals \
+                 contain the uncertainty: {}",
+                ranges.join(", ")
+            )
+        })
     }
 
     /// Experiment of the campaign's cases.

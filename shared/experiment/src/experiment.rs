@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 use tracktwin_parameters::quantity::SPEED;
-use tracktwin_parameters::{Case, QuantityError, TrackDesign};
+use tracktwin_parameters::{DesignAxis, DesignAxisError, QuantityError, TrackDesign};
 use tracktwin_signal::{FeatureDefinition, FeatureError, ThirdOctave};
-use tracktwin_track::extension::{ExtensionInstance, InstanceError, SampledExtension};
+use tracktwin_track::extension::{InstanceError, SampledExtension};
 
 /// Smallest number of spans between the evaluated stretch and the held ends of the rail.
 const END_SPANS: f64 = 8.0;
@@ -29,6 +29,9 @@ const WAVELENGTHS_M: [f64; 2] = [0.25e-3, 1.0];
 pub struct Experiment {
     /// Design of track and vehicle: sections, masses, spacing and load.
     pub design: TrackDesign,
+    /// Numbers of the design that differ from case to case.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub design_axes: Vec<DesignAxis>,
     /// Number of spans of the track.
     pub spans: usize,
     /// Number of rail elements in each span.
@@ -112,6 +115,9 @@ pub enum ExperimentError {
         /// Smallest sufficient number of spans.
         needed: usize,
     },
+    /// A varied number of the design is invalid.
+    #[error("parameters.{0}")]
+    Design(#[from] DesignAxisError),
     /// An extension is invalid.
     #[error("extension: {0}")]
     Extension(#[from] InstanceError),
@@ -153,6 +159,7 @@ impl Experiment {
     pub fn new(design: TrackDesign) -> Self {
         Self {
             design,
+            design_axes: Vec::new(),
             spans: 40,
             rail_elements_per_span: 4,
             sleeper_elements: 8,
@@ -164,19 +171,6 @@ impl Experiment {
             features: FeatureDefinition::default(),
             extensions: Vec::new(),
         }
-    }
-
-    /// The extensions of a case with their values. They depend only on the experiment and on the
-    /// parameters and seed of the case.
-    pub fn extensions_of(&self, case: &Case) -> Vec<ExtensionInstance> {
-        let seed = |number: usize| {
-            let mut hasher = blake3::Hasher::new_derive_key("tracktwin case extension 1");
-            hasher.update(case.parameter_hash().as_bytes()).update(&(number as u64).to_le_bytes());
-            let hash = hasher.finalize();
-            u64::from_le_bytes(*hash.as_bytes().first_chunk().expect("a hash has 32 bytes"))
-        };
-        let numbered = self.extensions.iter().enumerate();
-        numbered.filter_map(|(number, extension)| extension.draw(seed(number))).collect()
     }
 
     /// Checks all settings and returns the experiment.
@@ -207,10 +201,13 @@ impl Experiment {
         // Ten steps a period of the highest feature.
         range("time_step_s", self.time_step_s, [1e-8, 0.1 / self.features.highest_hz])?;
         range("run_in_spans", self.run_in_spans, [0.0, 1000.0])?;
-        self.check_room()?;
-        self.check_steps()?;
-        for extension in &self.extensions {
-            extension.check(&self.design, self.spans)?;
+        DesignAxis::check_all(&self.design_axes, &self.design)?;
+        for design in self.end_designs() {
+            self.check_room(&design)?;
+            self.check_steps(&design)?;
+            for extension in &self.extensions {
+                extension.check(&design, self.spans)?;
+            }
         }
         Ok(self)
     }
@@ -256,9 +253,9 @@ impl Experiment {
     }
 
     /// The slowest pass is held in memory, a group of cases at a time.
-    fn check_steps(&self) -> Result<(), ExperimentError> {
+    fn check_steps(&self, design: &TrackDesign) -> Result<(), ExperimentError> {
         let Some(&speed_km_h) = self.speeds_km_h.first() else { return Ok(()) };
-        let stretch = self.stretch(speed_km_h);
+        let stretch = self.stretch(design, speed_km_h);
         let way_m = stretch.end_m - stretch.start_m;
         let steps = way_m / metres_per_second(speed_km_h) / self.time_step_s;
         if steps <= STEPS_MAX {
@@ -267,9 +264,9 @@ impl Experiment {
         Err(ExperimentError::TooManySteps { time_step_s: self.time_step_s, steps, speed_km_h })
     }
 
-    /// The way at one speed: the window is one spacing, centred at the middle sleeper.
-    pub(crate) fn stretch(&self, speed_km_h: f64) -> Stretch {
-        let spacing = self.design.sleeper.spacing_m;
+    /// The way over a track of this design at one speed: the window is one spacing, centred at the middle sleeper.
+    pub(crate) fn stretch(&self, design: &TrackDesign, speed_km_h: f64) -> Stretch {
+        let spacing = design.sleeper.spacing_m;
         let margin = self.features.margin_s * speed_km_h / KM_H;
         let window_m = (self.sleeper() as f64 - 0.5) * spacing;
         let kept_m = window_m - margin;
@@ -283,11 +280,11 @@ impl Experiment {
     }
 
     /// Everything kept stays [`END_SPANS`] off the ends, and the run-in begins on the track.
-    fn check_room(&self) -> Result<(), ExperimentError> {
+    fn check_room(&self, design: &TrackDesign) -> Result<(), ExperimentError> {
         // The margin is a time, so that the fastest pass needs the longest track.
         let speed_km_h = self.speeds_km_h.iter().copied().fold(0.0, f64::max);
-        let spacing = self.design.sleeper.spacing_m;
-        let stretch = self.stretch(speed_km_h);
+        let spacing = design.sleeper.spacing_m;
+        let stretch = self.stretch(design, speed_km_h);
         let half = (stretch.window_end_m - stretch.kept_m) / spacing - 0.5;
         let needed = ((half + END_SPANS.max(self.run_in_spans)).ceil() * 2.0) as usize;
         if self.spans < needed {
@@ -330,7 +327,7 @@ mod tests {
     fn what_is_kept_stays_eight_spans_off_the_ends() {
         let spacing = experiment().design.sleeper.spacing_m;
         for speed in experiment().speeds_km_h {
-            let stretch = experiment().stretch(speed);
+            let stretch = experiment().stretch(&experiment().design, speed);
             assert!(stretch.kept_m >= 8.0 * spacing);
             assert!(stretch.end_m <= 32.0 * spacing);
             assert!(stretch.start_m > 0.0);

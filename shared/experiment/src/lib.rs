@@ -40,6 +40,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod drawn;
 mod experiment;
 mod outcome;
 mod simulate;

@@ -1,6 +1,6 @@
 //! Simulation of a case: parameters, track model, one pass per speed, signal, features.
 
-use crate::experiment::{Experiment, ExperimentError, metres_per_second};
+use crate::experiment::{Experiment, ExperimentError, Stretch, metres_per_second};
 use crate::outcome::{Outcome, PassFeatures};
 use std::ops::Range;
 use tracktwin_parameters::{Case, Parameter};
@@ -54,12 +54,15 @@ enum CaseError {
 
 impl Simulate for Simulation {
     fn simulate(&self, cases: &[Case]) -> Vec<Outcome> {
+        let separately =
+            || cases.iter().flat_map(|case| self.simulate(std::slice::from_ref(case))).collect();
+        if cases.len() > 1 && self.experiment.varies_spacing() {
+            return separately();
+        }
         match self.together(cases) {
             Ok(outcomes) => outcomes,
             // One spoils it for the others: each for itself.
-            Err(_) if cases.len() > 1 => {
-                cases.iter().flat_map(|case| self.simulate(std::slice::from_ref(case))).collect()
-            }
+            Err(_) if cases.len() > 1 => separately(),
             Err(error) => vec![Outcome::Failed { reason: error.to_string() }; cases.len()],
         }
     }
@@ -76,29 +79,32 @@ impl Simulation {
         Ok(Self { experiment, extractor })
     }
 
-    /// Simulates all cases together, one speed after another.
+    /// Simulates all cases together, one speed after another. All have the same sleeper spacing.
     fn together(&self, cases: &[Case]) -> Result<Vec<Outcome>, CaseError> {
+        let Some(first) = cases.first() else { return Ok(Vec::new()) };
+        let design = self.experiment.design_of(first);
         let models = cases.iter().map(|case| self.model(case)).collect::<Result<Vec<_>, _>>()?;
         let pairs = cases.iter().zip(&models);
         let surfaces: Vec<_> = pairs.map(|(case, model)| self.surface(case, model)).collect();
         let mut passes = vec![Vec::new(); cases.len()];
         for &speed_km_h in &self.experiment.speeds_km_h {
-            let records = time::passes(&models, &self.pass(speed_km_h), &surfaces)
+            let stretch = self.experiment.stretch(&design, speed_km_h);
+            let records = time::passes(&models, &self.pass(stretch, speed_km_h), &surfaces)
                 .map_err(|source| CaseError::Pass { speed_km_h, source })?;
             for ((passes, record), model) in passes.iter_mut().zip(records).zip(&models) {
-                let kept = self.samples(&record, speed_km_h)[0].start;
+                let kept = samples(stretch, &record)[0].start;
                 let contact_loss_share = Some(record.contact_loss_share(kept));
-                let features = self.features(&measured(record, model), speed_km_h)?;
+                let features = self.features(&measured(record, model), stretch, speed_km_h)?;
                 passes.push(PassFeatures { speed_km_h, features, contact_loss_share });
             }
         }
         Ok(passes.into_iter().map(Outcome::Finished).collect())
     }
 
-    /// The track model of a case, with equal sleepers and the extensions of the case.
+    /// The track model of a case, with equal sleepers, and the design and extensions of the case.
     fn model(&self, case: &Case) -> Result<TrackModel, CaseError> {
-        let Experiment { design, spans, rail_elements_per_span, sleeper_elements, .. } =
-            &self.experiment;
+        let Experiment { spans, rail_elements_per_span, sleeper_elements, .. } = &self.experiment;
+        let design = &self.experiment.design_of(case);
         let mesh = Mesh::uniform(*spans, *rail_elements_per_span, *sleeper_elements);
         let supports = vec![Support::from(&case.parameters); spans - 1];
         let extensions = self.experiment.extensions_of(case);
@@ -114,8 +120,7 @@ impl Simulation {
         model.surface(&roughness, case.surface_seed)
     }
 
-    fn pass(&self, speed_km_h: f64) -> Pass {
-        let stretch = self.experiment.stretch(speed_km_h);
+    fn pass(&self, stretch: Stretch, speed_km_h: f64) -> Pass {
         Pass {
             speed_m_s: metres_per_second(speed_km_h),
             start_m: stretch.start_m,
@@ -125,8 +130,13 @@ impl Simulation {
         }
     }
 
-    fn features(&self, record: &PassRecord, speed_km_h: f64) -> Result<Features, CaseError> {
-        let [kept, window] = self.samples(record, speed_km_h);
+    fn features(
+        &self,
+        record: &PassRecord,
+        stretch: Stretch,
+        speed_km_h: f64,
+    ) -> Result<Features, CaseError> {
+        let [kept, window] = samples(stretch, record);
         let samples = record.acceleration_m_s2[kept.start..].to_vec();
         let signal = Signal::new(1.0 / record.time_step_s, samples)
             .map_err(|source| CaseError::Signal { speed_km_h, source })?;
@@ -143,16 +153,15 @@ impl Simulation {
             Err(CaseError::NotFinite { speed_km_h })
         }
     }
+}
 
-    /// Samples of the kept stretch and of the window: from the first at or behind its beginning, as
-    /// many as fit.
-    fn samples(&self, record: &PassRecord, speed_km_h: f64) -> [Range<usize>; 2] {
-        let stretch = self.experiment.stretch(speed_km_h);
-        let step_m = record.speed_m_s * record.time_step_s;
-        let sample = |x_m: f64| ((x_m - record.start_m) / step_m).ceil().max(0.0) as usize;
-        let window = sample(stretch.window_m)..sample(stretch.window_end_m);
-        [sample(stretch.kept_m)..record.acceleration_m_s2.len(), window]
-    }
+/// Samples of the kept stretch and of the window: from the first at or behind its beginning, as many as
+/// fit.
+fn samples(stretch: Stretch, record: &PassRecord) -> [Range<usize>; 2] {
+    let step_m = record.speed_m_s * record.time_step_s;
+    let sample = |x_m: f64| ((x_m - record.start_m) / step_m).ceil().max(0.0) as usize;
+    let window = sample(stretch.window_m)..sample(stretch.window_end_m);
+    [sample(stretch.kept_m)..record.acceleration_m_s2.len(), window]
 }
 
 /// The pass as the measuring chain records it, with the true positions of the wheel.
@@ -229,6 +238,27 @@ mod tests {
     }
 
     #[test]
+    fn cases_whose_design_differs_do_not_depend_on_their_company() {
+        let mass = r#"{"number": "vehicle.mass_kg", "low": 40.0, "high": 48.0}"#;
+        let spacing = r#"{"number": "track.sleeper.spacing_m", "low": 0.11, "high": 0.14}"#;
+        for axes in [vec![mass], vec![mass, spacing]] {
+            let mut experiment = simulation().experiment;
+            experiment.design_axes =
+                axes.iter().map(|axis| serde_json::from_str(axis).unwrap()).collect();
+            let varied = Simulation::new(&experiment).unwrap();
+            let cases: Vec<_> = (0..3).map(case).collect();
+            let together = varied.simulate(&cases);
+            for (case, outcome) in cases.iter().zip(&together) {
+                let design = experiment.design_of(case);
+                let alone = Experiment { design, design_axes: Vec::new(), ..experiment.clone() };
+                let alone = Simulation::new(&alone).unwrap();
+                assert_eq!(&alone.simulate(std::slice::from_ref(case))[0], outcome);
+                assert!(matches!(outcome, Outcome::Finished(_)), "{outcome:?}");
+            }
+        }
+    }
+
+    #[test]
     fn a_case_that_cannot_be_is_a_result_and_spoils_no_other() {
         let impossible = ParameterSet::nominal().with(Parameter::RailpadStiffness, -1.0);
         let cases = [case(0), Case { parameters: impossible, ..case(1) }, case(2)];
@@ -242,7 +272,8 @@ mod tests {
     #[test]
     fn the_window_is_one_spacing_centred_at_the_middle_sleeper() {
         let simulation = simulation();
-        let pass = simulation.pass(13.0);
+        let stretch = simulation.experiment.stretch(&TrackDesign::v_track(), 13.0);
+        let pass = simulation.pass(stretch, 13.0);
         let length = pass.steps() + 1;
         let record = PassRecord {
             time_step_s: pass.time_step_s,
@@ -251,7 +282,7 @@ mod tests {
             acceleration_m_s2: vec![0.0; length],
             contact_force_n: vec![0.0; length],
         };
-        let [kept, window] = simulation.samples(&record, 13.0);
+        let [kept, window] = samples(stretch, &record);
         let step_m = pass.speed_m_s * pass.time_step_s;
         let centre = (window.start + window.end) as f64 / 2.0;
         // Within the half sample that whole samples allow at either end.

@@ -9,6 +9,7 @@
 mod case;
 mod catalogue;
 mod design;
+mod design_number;
 mod preset;
 mod prior;
 pub mod quantity;
@@ -21,6 +22,7 @@ mod track;
 pub use case::Case;
 pub use catalogue::Parameter;
 pub use design::{BeamSection, SleeperDesign, TrackDesign, Wheel};
+pub use design_number::{DesignAxis, DesignAxisError, DesignNumber};
 pub use preset::Preset;
 pub use prior::Prior;
 pub use quantity::{Quantity, QuantityError};

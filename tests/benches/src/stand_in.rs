@@ -56,7 +56,7 @@ pub async fn fill(library: &Library, cases: u32) -> Result<(), Failure> {
     library.insert_campaign(&record).await?;
     for start in (0..cases).step_by(4096) {
         let chunk: Vec<Case> = (start..cases.min(start + 4096)).map(case).collect();
-        library.insert_cases(CAMPAIGN, &chunk).await?;
+        library.insert_cases(CAMPAIGN, &chunk, |_| None).await?;
     }
     Ok(())
 }

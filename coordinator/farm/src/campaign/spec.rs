@@ -1,15 +1,16 @@
 //! The campaign file (TOML) and the checked [`Campaign`] that is built from it.
 
+mod parameters;
 mod surface;
 
+use parameters::Parameters;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use tracktwin_experiment::{Experiment, ExperimentError};
 use tracktwin_parameters::quantity::CASES;
 use tracktwin_parameters::{
-    Axis, OWEN_POINTS_MAX, Parameter, ParameterSet, ParameterSpace, Preset, QuantityError, Scale,
-    Sequence, SpaceError, Track, TrackError, toml_fault,
+    OWEN_POINTS_MAX, Parameter, ParameterSpace, Preset, QuantityError, Sequence, SpaceError, Track,
+    TrackError, toml_fault,
 };
 use tracktwin_signal::FeatureDefinition;
 use tracktwin_track::extension::SampledExtension;
@@ -178,33 +179,13 @@ struct File {
     surfaces: Surfaces,
     speeds_km_h: Option<Vec<f64>>,
     #[serde(default)]
-    parameters: BTreeMap<Parameter, Range>,
+    parameters: Parameters,
     #[serde(default)]
     simulation: Simulation,
     #[serde(default)]
     features: FeatureDefinition,
     #[serde(default)]
     extension: Vec<SampledExtension>,
-}
-
-/// Value or range of a parameter, as written in the file.
-#[derive(Clone, Copy, Deserialize)]
-#[serde(untagged, expecting = "expected a number, [low, high] or { low, high, scale }")]
-enum Range {
-    Fixed(f64),
-    Between([f64; 2]),
-    Scaled { low: f64, high: f64, scale: Scale },
-}
-
-impl Range {
-    /// All numbers of the range: one or two.
-    fn values(self) -> Vec<f64> {
-        match self {
-            Self::Fixed(value) => vec![value],
-            Self::Between(ends) => ends.to_vec(),
-            Self::Scaled { low, high, .. } => vec![low, high],
-        }
-    }
 }
 
 /// The numerical settings that a campaign may change.
@@ -317,7 +298,7 @@ impl File {
         if sequence == Sequence::OwenScrambled && cases > OWEN_POINTS_MAX {
             return Err(SpecError::SequenceExhausted { path: path.to_owned(), cases });
         }
-        let (space, fixed) = self.sampled(path, track)?;
+        let (space, fixed) = self.parameters.sampled(path, track)?;
         let experiment = self
             .experiment(track)
             .map_err(|source| SpecError::Experiment { path: path.to_owned(), source })?;
@@ -328,39 +309,10 @@ impl File {
         Ok(Campaign { name: self.name, cases, sequence_by_cases, definition })
     }
 
-    /// Returns the sampled parameter space and the values of the parameters that are not sampled.
-    fn sampled(
-        &self,
-        path: &str,
-        track: &Track,
-    ) -> Result<(ParameterSpace, ParameterSet), SpecError> {
-        let mut axes = Vec::new();
-        let mut fixed = track.nominal;
-        for &parameter in Parameter::ALL {
-            let linear = |low, high| Axis { parameter, low, high, scale: Scale::Linear };
-            match self.parameters.get(&parameter) {
-                None => axes.push(track.axis(parameter)),
-                Some(&Range::Between([low, high])) => axes.push(linear(low, high)),
-                Some(&Range::Scaled { low, high, scale }) => {
-                    axes.push(Axis { parameter, low, high, scale });
-                }
-                Some(&Range::Fixed(value)) => fixed[parameter] = value,
-            }
-            let given = self.parameters.get(&parameter);
-            for value in given.map(|range| range.values()).unwrap_or_default() {
-                let key = format!("parameters.{parameter}");
-                let checked = parameter.quantity().check(value);
-                checked.map_err(|source| number(path, &key, source))?;
-            }
-        }
-        let space = ParameterSpace::new(axes)
-            .map_err(|source| SpecError::Space { path: path.to_owned(), source })?;
-        Ok((space, fixed))
-    }
-
     fn experiment(&self, track: &Track) -> Result<Experiment, ExperimentError> {
         let simulation = &self.simulation;
         let mut experiment = Experiment::new(track.design.clone());
+        self.parameters.set_design(&mut experiment)?;
         experiment.wavelengths_m = track.wavelengths_m;
         let speeds = self.speeds_km_h.as_ref();
         experiment.speeds_km_h.clone_from(speeds.unwrap_or(&track.speeds_km_h));

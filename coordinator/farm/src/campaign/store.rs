@@ -2,7 +2,7 @@
 
 use super::{Campaign, cases};
 use tracktwin_library::{CampaignRecord, Library, LibraryError};
-use tracktwin_parameters::SobolError;
+use tracktwin_parameters::{Case, SobolError};
 
 /// Number of cases stored in one call. It bounds the memory needed for a campaign with a million cases.
 const CASES_AT_A_TIME: u32 = 4096;
@@ -57,12 +57,17 @@ pub async fn add_cases(
     mut goes_on: impl FnMut(u32) -> bool,
 ) -> Result<(), StoreError> {
     let id = campaign.id();
+    let experiment = &campaign.definition.experiment;
+    let drawn = |case: &Case| {
+        let drawn = experiment.drawn(case);
+        (!drawn.is_empty()).then(|| serde_json::to_string(&drawn).expect("numbers become JSON"))
+    };
     // Cases are stored in order, so the existing ones are the first; those after a gap are kept
     // unchanged.
     let mut stored = library.cases_in_order(&id).await?;
     while goes_on(stored) && stored < campaign.cases {
         let end = campaign.cases.min(stored.saturating_add(CASES_AT_A_TIME));
-        library.insert_cases(&id, &cases(campaign, stored..end)?).await?;
+        library.insert_cases(&id, &cases(campaign, stored..end)?, drawn).await?;
         stored = end;
     }
     Ok(())

@@ -212,7 +212,7 @@ tables! {
         ["campaign_id" Text, "sobol_index" Integer], PARAMETERS, [
             "surface_seed" Integer, "parameter_hash" Text, "state" Text, "epoch" Integer,
             "attempts" Integer, "worker" Text, "lease_expires_unix_ms" Integer, "error" Text,
-            "leased_unix_ms" Integer,
+            "leased_unix_ms" Integer, "drawn" Text,
         ]
     }
     FREQUENCY_BIN = "frequency_bin" by ["experiment_hash", "bin"] {
@@ -235,7 +235,7 @@ tables! {
         ["surface_seed" Integer], LEVELS, [
             "log_power" Doubles, "duration_s" Real, "worker" Text, "code_version" Text,
             "model_hash" Text, "experiment_hash" Text, "parameter_hash" Text, "finished_at" Text,
-            "flagged" Text, "contact_loss_share" Real, "checksum" Text,
+            "flagged" Text, "contact_loss_share" Real, "checksum" Text, "drawn" Text,
         ]
     }
     ATTEMPT = "attempt" by ["campaign_id", "sobol_index", "epoch"] {

@@ -233,7 +233,7 @@ on_both_databases! {
         assert_eq!(library.cases_in_order(CAMPAIGN).await.unwrap(), 6);
         sql(home, "delete from campaign_case where sobol_index in (2, 4)").await;
         assert_eq!(library.cases_in_order(CAMPAIGN).await.unwrap(), 2);
-        library.insert_cases(CAMPAIGN, &(2..6).map(case).collect::<Vec<_>>()).await.unwrap();
+        library.insert_cases(CAMPAIGN, &(2..6).map(case).collect::<Vec<_>>(), |_| None).await.unwrap();
         assert_eq!(library.cases_in_order(CAMPAIGN).await.unwrap(), 6);
         let findings = library.verify(|| ()).await.unwrap().findings;
         assert!(findings.iter().all(|it| it.what.ends_with("does not match its hash")), "{findings:?}");

@@ -285,7 +285,7 @@ async fn file_of(url: &str, table: &str) -> Option<PathBuf> {
 /// Adds a case and an attempt of it to a library.
 async fn attempt(url: &str) {
     let library = Library::open(url).await.unwrap();
-    library.insert_cases(CAMPAIGN, &[crate::support::case(2)]).await.unwrap();
+    library.insert_cases(CAMPAIGN, &[crate::support::case(2)], |_| None).await.unwrap();
     let leased = lease(&library, "w", 1, 0).await;
     report(&library, "w", vec![crate::support::failed(&leased[0])]).await;
     library.close().await;

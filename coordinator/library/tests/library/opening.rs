@@ -60,7 +60,7 @@ on_both_databases! {
         let library = home.library(2).await;
         let cases: Vec<_> = (0..5).map(case).collect();
         library.insert_campaign(&record()).await.unwrap();
-        library.insert_cases(CAMPAIGN, &cases).await.unwrap();
+        library.insert_cases(CAMPAIGN, &cases, |_| None).await.unwrap();
         assert_eq!(library.status(CAMPAIGN).await.unwrap().total(), 5);
         let other = CampaignRecord { definition_hash: "other".to_owned(), ..record() };
         let error = library.insert_campaign(&other).await.unwrap_err();

@@ -55,7 +55,10 @@ async fn another_campaign(library: &Library) {
     let campaign = || "another-000000000000".to_owned();
     let record = CampaignRecord { id: campaign(), ..library.campaign(CAMPAIGN).await.unwrap() };
     library.insert_campaign(&record).await.unwrap();
-    library.insert_cases(&campaign(), &(0..4).map(case).collect::<Vec<_>>()).await.unwrap();
+    library
+        .insert_cases(&campaign(), &(0..4).map(case).collect::<Vec<_>>(), |_| None)
+        .await
+        .unwrap();
     work(library, &campaign()).await;
     let mut training = TrainingRecord { campaign: campaign(), ..training() };
     training.surrogates[0].mase_test = 0.01;

@@ -97,7 +97,7 @@ pub(crate) async fn fill(library: &Library, campaign: &str, count: u32) {
     let record = CampaignRecord { id: campaign.to_owned(), ..record() };
     library.insert_campaign(&record).await.unwrap();
     let cases: Vec<_> = (0..count).map(case).collect();
-    library.insert_cases(campaign, &cases).await.unwrap();
+    library.insert_cases(campaign, &cases, |_| None).await.unwrap();
 }
 
 pub(crate) fn record() -> CampaignRecord {

@@ -33,7 +33,7 @@ on_both_databases! {
 
     async fn views_of_this_program_or_a_later_one_are_left_alone(home: &Home) {
         home.library(1).await.close().await;
-        for version in ["1", "99"] {
+        for version in ["2", "99"] {
             of_version(home, version).await;
             let library = home.open().await;
             assert!(!is_there(&library).await, "{version}");

@@ -8,10 +8,12 @@ use super::files::{Force, make_folder};
 use super::library_url::open_or_create;
 use super::numbers::{cores, count};
 use super::progress::{Progress, TrainingBar};
+use super::recording::{Channel, RecordingArgument};
 use super::signals::stop_on_signal;
 use super::track::{preset_parser, read};
 use super::{OrInput, Stop, continuity, evaluate, print_json, println_stderr, println_stdout};
 use crate::commands::contact::contact_sentence;
+use crate::pipeline::evaluate::design_for;
 use crate::pipeline::lack::check_for_training;
 use crate::pipeline::models;
 use anyhow::anyhow;
@@ -74,6 +76,8 @@ pub(super) struct Arguments {
     /// Recording to evaluate [default: a bundled sample, of V-Track or of 60E1-concrete].
     #[arg(long, value_name = "DIR", conflicts_with = "no_train")]
     recording: Option<PathBuf>,
+    #[command(flatten)]
+    channel: Channel,
     /// Number of cores for the simulation [default: all].
     #[arg(long, value_name = "N", value_parser = cores)]
     cores: Option<NonZeroUsize>,
@@ -93,7 +97,7 @@ impl Arguments {
     /// diagnosis accepted.
     pub(super) fn of(
         campaign: PathBuf,
-        recording: &Path,
+        recording: &RecordingArgument,
         library: &str,
         out: PathBuf,
         cores: Option<NonZeroUsize>,
@@ -109,7 +113,8 @@ impl Arguments {
             out,
             force,
             no_train: false,
-            recording: Some(recording.to_owned()),
+            recording: Some(recording.folder().to_owned()),
+            channel: recording.channel().clone(),
             cores,
             print_campaign: false,
             json: false,
@@ -140,7 +145,8 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     }
     .or_input()?;
     // Check the recording before the simulation.
-    let given = arguments.recording.as_deref().map(evaluate::open).transpose()?;
+    let given = arguments.recording.as_deref();
+    let given = given.map(|folder| evaluate::open(folder, &arguments.channel)).transpose()?;
     if let Some(recording) = &given {
         check(recording, &campaign).or_input()?;
     }
@@ -263,7 +269,7 @@ pub(super) fn check(
     campaign: &Campaign,
 ) -> Result<(), tracktwin_evaluation::Error> {
     let experiment = &campaign.definition.experiment;
-    check_recording(recording, &experiment.design, &experiment.speeds_km_h)
+    check_recording(recording, &design_for(experiment, recording), &experiment.speeds_km_h)
 }
 
 pub(super) fn default_library(out: &Path) -> String {

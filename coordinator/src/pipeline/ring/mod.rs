@@ -207,7 +207,8 @@ impl RingStudy<'_> {
         let folder = self.folder.join(EVALUATIONS).join(name);
         let path = folder.join(EVALUATION);
         if !path.exists() {
-            check_recording(recording, models.design(), &models.set().speeds_km_h)?;
+            let design = models.design_for(recording);
+            check_recording(recording, &design, &models.set().speeds_km_h)?;
             let evaluation = compute(|| models.evaluate(recording))?;
             let mut output = Output::begin(&folder, Kind::Results, self.force)?;
             evaluation.add_to(&mut output)?;

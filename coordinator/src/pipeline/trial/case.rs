@@ -108,7 +108,7 @@ impl Trial {
     ) -> Result<(), TrialError> {
         let Some(evaluator) = &self.paper else { return Ok(()) };
         let speeds = &evaluator.set().speeds_km_h;
-        let evaluation = check_recording(recording, evaluator.design(), speeds)
+        let evaluation = check_recording(recording, &evaluator.design_for(recording), speeds)
             .and_then(|()| compute(|| evaluator.evaluate(recording)))
             .map_err(|source| TrialError::Paper { number, source })?;
         let paper = Paper::of(&self.opened(number)?.scene, &evaluation);

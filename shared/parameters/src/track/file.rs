@@ -184,7 +184,7 @@ impl Track {
 }
 
 impl File {
-    fn design(&self) -> TrackDesign {
+    pub(super) fn design(&self) -> TrackDesign {
         let TrackTable { railhead_radius_m, rail, sleeper } = &self.track;
         TrackDesign {
             rail: BeamSection {

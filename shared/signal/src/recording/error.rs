@@ -1,5 +1,6 @@
 //! Errors of a recording: file, field, fault and remedy, on one line.
 
+use super::selection::SelectionFault;
 use std::path::Path;
 use tracktwin_number::{rounded, significant};
 use tracktwin_parameters::QuantityError;
@@ -82,6 +83,9 @@ pub enum Fault {
         /// The expected value.
         expected: &'static str,
     },
+    /// The selection of rail and axle selects no passes, or those of several rails.
+    #[error(transparent)]
+    Selection(SelectionFault),
     /// Two sleepers have the same name.
     #[error("duplicate sleeper id {id}; give every sleeper a unique id")]
     SleeperTwice {

@@ -4,6 +4,7 @@ use super::columns::{Columns, NAMES};
 use super::error::{Fault, RecordingError};
 use super::manifest::{FILE_NAME, Manifest, PassEntry};
 use super::odometer::Odometer;
+use super::selection::Selection;
 use super::sleeper::Sleeper;
 use super::window::SleeperWindow;
 use super::{check, limits, parquet_file, quiet};
@@ -17,7 +18,7 @@ use tracktwin_number::significant;
 /// Axle-box accelerations of one vehicle over one stretch of track, in several passes.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    /// Name of the recording: that of its folder.
+    /// Name of the recording: that of its folder, with the selected rail and axle.
     pub name: String,
     /// Samples per second of every pass, in Hz.
     pub sample_rate_hz: f64,
@@ -52,17 +53,29 @@ pub struct Pass {
 }
 
 impl Recording {
-    /// Reads and checks the recording in the folder `path`.
+    /// Reads and checks the recording in the folder `path`. All its passes are over one rail.
     ///
     /// # Errors
     /// The first error: its file, its field and the remedy.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, RecordingError> {
+        Self::open_selected(path, &Selection::default())
+    }
+
+    /// Reads and checks the selected passes of the recording in the folder `path`.
+    ///
+    /// # Errors
+    /// The first error: its file, its field and the remedy.
+    pub fn open_selected(
+        path: impl AsRef<Path>,
+        selection: &Selection,
+    ) -> Result<Self, RecordingError> {
         let folder = path.as_ref();
         let (manifest_path, manifest, spacing_m) = stated(folder, Manifest::read)?;
-        let mut passes = Vec::with_capacity(manifest.passes.len());
+        let selected = selection.of(&manifest_path, &manifest.passes)?;
+        let mut passes = Vec::with_capacity(selected.len());
         let mut doubts = Vec::new();
-        for index in 0..manifest.passes.len() {
-            let path = pass_path(folder, &manifest_path, index, &manifest.passes[index])?;
+        for (index, entry) in selected {
+            let path = pass_path(folder, &manifest_path, index, entry)?;
             let (pass, step_m) = read_pass(&path, &manifest_path, index, &manifest, spacing_m)?;
             doubts.extend(step_m.map(|step_m| straightened(&pass.file, step_m)));
             passes.push(pass);
@@ -73,7 +86,8 @@ impl Recording {
         let copies = check::copies(paths.iter().map(PathBuf::as_path).zip(samples));
         doubts.extend(copies.iter().map(|copy| format!("doubt: {copy}")));
         let stated = Self::of_manifest(folder, manifest, spacing_m);
-        let mut recording = Self { passes, doubts, ..stated };
+        let name = stated.name.clone() + &selection.suffix();
+        let mut recording = Self { name, passes, doubts, ..stated };
         recording.check_sleepers(&manifest_path)?;
         let gain_known = recording.gain_known();
         let quiet = recording.passes.iter().filter_map(|pass| quiet::doubt(pass, gain_known));
@@ -215,6 +229,8 @@ impl Recording {
                 .map(|(pass, file)| PassEntry {
                     file,
                     speed_km_h: pass.speed_km_h,
+                    rail: None,
+                    axle: None,
                     contact_loss_share: pass.contact_loss_share,
                 })
                 .collect(),
@@ -275,7 +291,7 @@ fn read_pass(
     check::length(path, &position_m, spacing_m)?;
     let signal = Signal::new(sample_rate_hz, columns.acceleration_m_s2)
         .expect("columns are finite and the rate is positive");
-    let PassEntry { file, speed_km_h, contact_loss_share } = entry.clone();
+    let PassEntry { file, speed_km_h, contact_loss_share, .. } = entry.clone();
     Ok((Pass { file, speed_km_h, signal, position_m, contact_loss_share }, step_m))
 }
 

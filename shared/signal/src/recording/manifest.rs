@@ -21,10 +21,14 @@ pub(super) struct Manifest {
 }
 
 /// One pass of `recording.json`.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub(super) struct PassEntry {
     pub file: String,
     pub speed_km_h: f64,
+    /// Name of the rail.
+    pub rail: Option<String>,
+    /// Name of the axle.
+    pub axle: Option<String>,
     /// Of a simulated pass, the share of the time without contact between wheel and rail.
     pub contact_loss_share: Option<f64>,
 }
@@ -98,11 +102,18 @@ impl PassEntry {
         let file = fields.text("file", "the file name of the pass")?.to_owned();
         let speed_km_h = fields.positive("speed_km_h", "the nominal speed in km/h")?;
         let contact_loss_share = fields.get("contact_loss_share").and_then(Value::as_f64);
-        Ok(Self { file, speed_km_h, contact_loss_share })
+        let rail = fields.name("rail", "the name of the rail, such as \"left\"")?;
+        let axle = fields.name("axle", "the name or number of the axle")?;
+        Ok(Self { file, speed_km_h, rail, axle, contact_loss_share })
     }
 
     fn to_json(&self) -> Value {
         let mut entry = json!({"file": self.file, "speed_km_h": self.speed_km_h});
+        for (key, name) in [("rail", &self.rail), ("axle", &self.axle)] {
+            if let Some(name) = name {
+                entry[key] = json!(name);
+            }
+        }
         if let Some(share) = self.contact_loss_share {
             entry["contact_loss_share"] = json!(share);
         }
@@ -156,6 +167,16 @@ impl<'a> Fields<'a> {
     fn text(&self, name: &str, expected: &'static str) -> Result<&'a str, RecordingError> {
         let value = self.needed(name, expected)?;
         value.as_str().ok_or_else(|| self.wrong(name, value, expected))
+    }
+
+    /// A name: text, or a whole number. `None` if the field is missing.
+    fn name(&self, name: &str, expected: &'static str) -> Result<Option<String>, RecordingError> {
+        match self.get(name) {
+            None | Some(Value::Null) => Ok(None),
+            Some(Value::String(text)) if !text.is_empty() => Ok(Some(text.clone())),
+            Some(Value::Number(number)) if number.is_u64() => Ok(Some(number.to_string())),
+            Some(other) => Err(self.wrong(name, other, expected)),
+        }
     }
 
     fn number(&self, name: &str, expected: &'static str) -> Result<f64, RecordingError> {

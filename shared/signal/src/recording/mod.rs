@@ -18,6 +18,7 @@ mod odometer;
 mod parquet_file;
 mod part;
 mod quiet;
+mod selection;
 mod sleeper;
 #[cfg(test)]
 mod tests;
@@ -29,6 +30,7 @@ pub use clock::STEP_TOLERANCE as TIME_STEP_TOLERANCE;
 pub use error::{Fault, RecordingError};
 pub use folder::{Pass, Recording};
 pub use odometer::{JUMP, JUMP_M};
+pub use selection::{Selection, SelectionFault};
 pub use sleeper::Sleeper;
 pub use track::{OtherTrack, StatedTrack, compare_designs, nominal};
 pub use window::SleeperWindow;

@@ -100,3 +100,34 @@ fn more_cases_leave_the_identity_as_it_was() {
     let other = Campaign::parse(&DEFAULT.replace("seed = 1", "seed = 2"), "", None).unwrap();
     assert_ne!(few.id(), other.id());
 }
+
+#[test]
+fn numbers_of_the_description_are_axes_or_values() {
+    let with = |section: &str| {
+        Campaign::parse(&format!("{DEFAULT}\n[parameters]\n{section}"), "c.toml", None)
+    };
+    let text = "vehicle.mass_kg = [42, 46]\n\"vehicle.load_N\" = 5000\n\
+                track.sleeper.spacing_m = { low = 0.12, high = 0.13, scale = \"logarithmic\" }\n\
+                ballast_stiffness_N_m = 1e7\n";
+    let campaign = with(text).unwrap();
+    let definition = &campaign.definition;
+    let experiment = &definition.experiment;
+    let axes: Vec<_> =
+        experiment.design_axes.iter().map(|it| (it.number.key(), it.low, it.high)).collect();
+    assert_eq!(axes, [("track.sleeper.spacing_m", 0.12, 0.13), ("vehicle.mass_kg", 42.0, 46.0)]);
+    assert_eq!(experiment.design.wheel.load_n, 5000.0);
+    assert_eq!(definition.space.axes().len(), 5);
+    assert_ne!(campaign.id(), with("ballast_stiffness_N_m = 1e7").unwrap().id());
+
+    for (section, message) in [
+        ("vehicle.mas_kg = 44", "`vehicle.mas_kg` is not a number of a track file"),
+        ("vehicle.mass_kg = [46, 42]", "parameters.vehicle.mass_kg: the range [46, 42]"),
+        ("vehicle.mass_kg = 0.044", "parameters.vehicle.mass_kg: 0.044 kg cannot be"),
+        ("vehicle.mass_kg = \"heavy\"", "expected a number, [low, high] or"),
+        ("mass_kg = 44", "such as vehicle.mass_kg"),
+        ("track.sleeper.rail_seat_m = [0, 0.3]", "lies outside the half sleeper of 0.24 m"),
+    ] {
+        let found = with(section).unwrap_err().to_string();
+        assert!(found.contains(message) && !found.contains('\n'), "{found}");
+    }
+}

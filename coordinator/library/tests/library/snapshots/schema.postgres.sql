@@ -86,8 +86,10 @@ table campaign_case (
     lease_expires_unix_ms bigint,
     error text collate "C",
     leased_unix_ms bigint,
+    drawn text collate "C",
     constraint a_case_has_one_place_in_its_campaign PRIMARY KEY (campaign_id, sobol_index),
     constraint campaign_case_campaign_id_fkey FOREIGN KEY (campaign_id) REFERENCES campaign(id),
+    constraint drawn_is_a_json_object CHECK ((json_typeof((drawn)::json) = 'object'::text)),
     constraint failed_for_a_reason CHECK (((state <> 'failed'::text) OR (error IS NOT NULL))),
     constraint leased_iff_lease_expires CHECK (((state = 'leased'::text) = (lease_expires_unix_ms IS NOT NULL))),
     constraint leased_to_somebody CHECK (((state <> 'leased'::text) OR (worker IS NOT NULL))),
@@ -326,6 +328,6 @@ view failed_case (campaign_id, sobol_index, railpad_stiffness_n_m, railpad_dampi
 
 view result (campaign_id, sobol_index, speed_km_h, log_power, level_50_hz_db, level_63_hz_db, level_80_hz_db, level_100_hz_db, level_125_hz_db, level_160_hz_db, level_200_hz_db, level_250_hz_db, level_315_hz_db, level_400_hz_db, level_500_hz_db, level_630_hz_db, level_800_hz_db, level_1000_hz_db, level_1250_hz_db, level_1600_hz_db, level_2000_hz_db, level_2500_hz_db, level_3150_hz_db, level_4000_hz_db, duration_s, worker, code_version, model_hash, experiment_hash, parameter_hash, finished_at, flagged, contact_loss_share, checksum)
 
-view result_with_parameters (campaign_id, sobol_index, speed_km_h, railpad_stiffness_n_m, railpad_damping_n_s_m, ballast_stiffness_n_m, ballast_damping_n_s_m, sleeper_ei_n_m2, irregularity_level, surface_seed, level_50_hz_db, level_63_hz_db, level_80_hz_db, level_100_hz_db, level_125_hz_db, level_160_hz_db, level_200_hz_db, level_250_hz_db, level_315_hz_db, level_400_hz_db, level_500_hz_db, level_630_hz_db, level_800_hz_db, level_1000_hz_db, level_1250_hz_db, level_1600_hz_db, level_2000_hz_db, level_2500_hz_db, level_3150_hz_db, level_4000_hz_db, log_power, duration_s, worker, code_version, model_hash, experiment_hash, parameter_hash, finished_at, flagged, contact_loss_share, checksum)
+view result_with_parameters (campaign_id, sobol_index, speed_km_h, railpad_stiffness_n_m, railpad_damping_n_s_m, ballast_stiffness_n_m, ballast_damping_n_s_m, sleeper_ei_n_m2, irregularity_level, surface_seed, level_50_hz_db, level_63_hz_db, level_80_hz_db, level_100_hz_db, level_125_hz_db, level_160_hz_db, level_200_hz_db, level_250_hz_db, level_315_hz_db, level_400_hz_db, level_500_hz_db, level_630_hz_db, level_800_hz_db, level_1000_hz_db, level_1250_hz_db, level_1600_hz_db, level_2000_hz_db, level_2500_hz_db, level_3150_hz_db, level_4000_hz_db, log_power, duration_s, worker, code_version, model_hash, experiment_hash, parameter_hash, finished_at, flagged, contact_loss_share, checksum, drawn)
 
 view spectrum (campaign_id, sobol_index, speed_km_h, bin, frequency_hz, log_power)

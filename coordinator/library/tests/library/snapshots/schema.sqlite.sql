@@ -86,7 +86,7 @@ CREATE TABLE campaign_case (
     -- By the coordinator's clock.
     lease_expires_unix_ms integer,
     -- How the last counted attempt ended.
-    error text, leased_unix_ms integer,
+    error text, leased_unix_ms integer, drawn text constraint drawn_is_a_json_object check (json_type(drawn) = 'object'),
     constraint a_case_has_one_place_in_its_campaign primary key (campaign_id, sobol_index),
     constraint state_is_known check (state in ('waiting', 'leased', 'finished', 'failed')),
     constraint leased_iff_lease_expires check (
@@ -374,6 +374,6 @@ view campaign_status (campaign_id, name, state, priority, cases, waiting, leased
 
 view failed_case (campaign_id, sobol_index, railpad_stiffness_N_m, railpad_damping_N_s_m, ballast_stiffness_N_m, ballast_damping_N_s_m, sleeper_EI_N_m2, irregularity_level, surface_seed, attempts, worker, error)
 
-view result_with_parameters (campaign_id, sobol_index, speed_km_h, railpad_stiffness_N_m, railpad_damping_N_s_m, ballast_stiffness_N_m, ballast_damping_N_s_m, sleeper_EI_N_m2, irregularity_level, surface_seed, level_50_Hz_dB, level_63_Hz_dB, level_80_Hz_dB, level_100_Hz_dB, level_125_Hz_dB, level_160_Hz_dB, level_200_Hz_dB, level_250_Hz_dB, level_315_Hz_dB, level_400_Hz_dB, level_500_Hz_dB, level_630_Hz_dB, level_800_Hz_dB, level_1000_Hz_dB, level_1250_Hz_dB, level_1600_Hz_dB, level_2000_Hz_dB, level_2500_Hz_dB, level_3150_Hz_dB, level_4000_Hz_dB, log_power, duration_s, worker, code_version, model_hash, experiment_hash, parameter_hash, finished_at, flagged, contact_loss_share, checksum)
+view result_with_parameters (campaign_id, sobol_index, speed_km_h, railpad_stiffness_N_m, railpad_damping_N_s_m, ballast_stiffness_N_m, ballast_damping_N_s_m, sleeper_EI_N_m2, irregularity_level, surface_seed, level_50_Hz_dB, level_63_Hz_dB, level_80_Hz_dB, level_100_Hz_dB, level_125_Hz_dB, level_160_Hz_dB, level_200_Hz_dB, level_250_Hz_dB, level_315_Hz_dB, level_400_Hz_dB, level_500_Hz_dB, level_630_Hz_dB, level_800_Hz_dB, level_1000_Hz_dB, level_1250_Hz_dB, level_1600_Hz_dB, level_2000_Hz_dB, level_2500_Hz_dB, level_3150_Hz_dB, level_4000_Hz_dB, log_power, duration_s, worker, code_version, model_hash, experiment_hash, parameter_hash, finished_at, flagged, contact_loss_share, checksum, drawn)
 
 view spectrum (campaign_id, sobol_index, speed_km_h, bin, frequency_Hz, log_power)

@@ -10,8 +10,9 @@ mod supports;
 mod table;
 
 use super::block::{Block, LANES};
+use super::contact::Wheels;
 use super::state::State;
-use crate::model::{HertzContact, Layout, TrackModel};
+use crate::model::{Layout, TrackModel};
 use crate::time::{Pass, PassError};
 use motion::{CondensedState, FurtherWheel, NodeState, Station};
 use rail::{Factor, Node, NodeRows, node_dofs, node_rows};
@@ -93,14 +94,13 @@ impl Solver {
         heights_m: &[Vec<Block>],
     ) -> Result<CondensedState, PassError> {
         let dt = pass.time_step_s;
-        let wheel = &models[0].vehicle().wheel;
-        let contact = HertzContact::new(models[0].design());
+        let wheels = Wheels::new(&models, dt);
         let condensed = Condensed { models, hanging };
         let first: Vec<&Station> = self.stations.iter().map(|of| &of[0]).collect();
-        let rest = condensed.at_rest(&first, wheel.load_n)?;
+        let rest = condensed.at_rest(&first, wheels.load_n)?;
         let at_rest = |station: &Station, height_m: Block| {
-            let given = contact.approach(wheel.load_n) + station.local_flexibility * wheel.load_n;
-            State::at_rest(station.deflection(&rest) + height_m + Block::splat(given))
+            let given = wheels.approach_m + Block::splat(station.local_flexibility) * wheels.load_n;
+            State::at_rest(station.deflection(&rest) + height_m + given)
         };
         let further = self.stations.iter().zip(heights_m).skip(1);
         let further = further.map(|(stations, heights_m)| FurtherWheel {
@@ -114,9 +114,7 @@ impl Solver {
         let mut pushed = vec![Node::default(); rest.len()];
         supports.advance(&rest, &mut pushed);
         Ok(CondensedState {
-            contact,
-            load: Block::splat(wheel.load_n),
-            wheel_compliance: Block::splat(dt * dt / (4.0 * wheel.mass_kg)),
+            wheels,
             wheel: at_rest(first[0], heights_m[0][0]),
             further: further.collect(),
             inertia: condensed.inertia(dt),
@@ -170,12 +168,12 @@ impl Condensed<'_> {
     }
 
     /// Displacements of the rail under the standing wheels.
-    fn at_rest(&self, stations: &[&Station], load_n: f64) -> Result<Vec<Node>, PassError> {
+    fn at_rest(&self, stations: &[&Station], load_n: Block) -> Result<Vec<Node>, PassError> {
         let mut rows = self.rows([0.0, 0.0, 1.0], 1.0);
         self.relieve(&mut rows, |hanging, dof| hanging[&dof].static_relief);
         let mut loads = vec![Node::default(); rows.len()];
         for station in stations {
-            let [a, b, c, d] = station.shape.map(|share| Block::splat(share * load_n));
+            let [a, b, c, d] = station.shape.map(|share| Block::splat(share) * load_n);
             loads[station.element] = [a, b];
             loads[station.element + 1] = [c, d];
         }

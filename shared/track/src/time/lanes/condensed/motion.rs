@@ -4,10 +4,10 @@ use super::pair;
 use super::rail::{Eliminated, Factor, Node, NodeRows};
 use super::supports::Supports;
 use super::table::Table;
-use crate::model::{HertzContact, TrackModel};
+use crate::model::TrackModel;
 use crate::time::Pass;
 use crate::time::lanes::block::Block;
-use crate::time::lanes::contact;
+use crate::time::lanes::contact::{self, Wheels};
 use crate::time::lanes::state::State;
 use pulp::{Arch, Simd, WithSimd};
 use std::array;
@@ -49,10 +49,7 @@ pub(super) struct NodeState {
 ///
 /// Nodes of the rail count from 1; the places before and behind them stand for nothing.
 pub(super) struct CondensedState {
-    pub(super) contact: HertzContact,
-    pub(super) load: Block,
-    /// Deflection of the wheel alone under a unit force in a step, `dt² / 4 m`.
-    pub(super) wheel_compliance: Block,
+    pub(super) wheels: Wheels,
     pub(super) wheel: State,
     /// `4 M / dt²` and `2 C / dt` of the rail.
     pub(super) inertia: Table<[NodeRows; 2]>,
@@ -96,14 +93,14 @@ impl CondensedState {
         let free = self.factor.meet(element, arrived);
         let shape = station.shape.map(Block::splat);
         let unit = self.factor.meet(element, [[shape[0], shape[1]], [shape[2], shape[3]]]);
-        let wheel_free = self.wheel_compliance.mul_add(self.load, self.wheel.inertial());
+        let wheel_free = self.wheels.compliance.mul_add(self.wheels.load_n, self.wheel.inertial());
         let overlap = wheel_free - under_wheel(shape, free) - height_m;
-        let compliance = under_wheel(shape, unit) + self.wheel_compliance;
+        let compliance = under_wheel(shape, unit) + self.wheels.compliance;
         let local = Block::splat(station.local_flexibility);
-        let force = contact::forces(self.contact, overlap, compliance + local);
+        let force = contact::forces(&self.wheels, overlap, compliance + local);
         self.substitute(element, loaded(free, unit, force));
         self.supports.advance(&self.solution, &mut self.pushed);
-        self.wheel.advance(self.wheel_compliance.subtracted_from(force, wheel_free));
+        self.wheel.advance(self.wheels.compliance.subtracted_from(force, wheel_free));
         force
     }
 
@@ -118,12 +115,12 @@ impl CondensedState {
         let free = self.displacements_at(station.element, element, met);
         let unit = self.factor.meet(station.element, [[shape[0], shape[1]], [shape[2], shape[3]]]);
         let wheel = &mut self.further[index].wheel;
-        let wheel_free = self.wheel_compliance.mul_add(self.load, wheel.inertial());
+        let wheel_free = self.wheels.compliance.mul_add(self.wheels.load_n, wheel.inertial());
         let overlap = wheel_free - under_wheel(shape, free) - height_m;
-        let compliance = under_wheel(shape, unit) + self.wheel_compliance;
+        let compliance = under_wheel(shape, unit) + self.wheels.compliance;
         let local = Block::splat(station.local_flexibility);
-        let force = contact::forces(self.contact, overlap, compliance + local);
-        wheel.advance(self.wheel_compliance.subtracted_from(force, wheel_free));
+        let force = contact::forces(&self.wheels, overlap, compliance + local);
+        wheel.advance(self.wheels.compliance.subtracted_from(force, wheel_free));
         let load = shape.map(|share| share * force);
         self.load([[load[0], load[1]], [load[2], load[3]]], station.element, element, arrived);
     }
@@ -300,7 +297,7 @@ impl WithSimd for Run<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Vec<Block> {
         let mut motion = self.motion;
-        let mut forces = vec![motion.load];
+        let mut forces = vec![motion.wheels.load_n];
         for (before, (station, &height_m)) in self.stations.iter().zip(self.heights_m).enumerate() {
             forces.push(motion.advance(before + 1, station, height_m));
         }

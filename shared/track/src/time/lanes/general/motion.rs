@@ -3,13 +3,12 @@
 use super::elimination::Elimination;
 use super::factor::Factor;
 use super::inertia::{Inertia, States, row_entries};
-use crate::model::{HertzContact, TrackModel};
+use crate::model::TrackModel;
 use crate::time::lanes::block::{Block, LANES};
-use crate::time::lanes::contact;
+use crate::time::lanes::contact::{self, Wheels};
 use crate::time::lanes::state::State;
 use crate::time::{Pass, PassError};
 use pulp::{Arch, Simd, WithSimd};
-use tracktwin_parameters::Wheel;
 
 /// The wheel's place on the rail at the end of a step, the same in all lanes.
 #[derive(Clone, Copy, Debug)]
@@ -50,10 +49,7 @@ impl Station {
 
 /// Eight wheels on eight tracks.
 pub(super) struct LaneState {
-    contact: HertzContact,
-    load: Block,
-    /// Deflection of the wheel alone under a unit force in a step, `dt² / 4 m`.
-    wheel_compliance: Block,
+    wheels: Wheels,
     factor: Factor,
     inertia: Inertia,
     track: States,
@@ -74,28 +70,25 @@ impl LaneState {
         height_m: Block,
     ) -> Result<Self, PassError> {
         let size = elimination.order.len();
-        let Wheel { mass_kg, load_n, .. } = models[0].vehicle().wheel;
-        let contact = HertzContact::new(models[0].design());
+        let dt = pass.time_step_s;
+        let wheels = Wheels::new(&models, dt);
         let stiffness = Factor::new(elimination, |row| {
             row_entries(elimination, &models, row, |matrices, place| matrices.stiffness()[place])
         })?;
         let mut rest = vec![Block::default(); size];
         for (slot, shape) in rest[station.first..].iter_mut().zip(station.shape) {
-            *slot = Block::splat(shape * load_n);
+            *slot = Block::splat(shape) * wheels.load_n;
         }
         stiffness.solve(&mut rest);
-        let given = contact.approach(load_n) + station.local_flexibility * load_n;
+        let given = wheels.approach_m + Block::splat(station.local_flexibility) * wheels.load_n;
         let rail = (rest[station.first..].iter().zip(station.shape))
             .fold(height_m, |sum, (u, shape)| u.mul_add(Block::splat(shape), sum));
-        let dt = pass.time_step_s;
         Ok(Self {
-            contact,
-            load: Block::splat(load_n),
-            wheel_compliance: Block::splat(dt * dt / (4.0 * mass_kg)),
+            wheels,
             factor: dynamic_stiffness(elimination, &models, dt)?,
             inertia: Inertia::new(elimination, &models, dt),
             track: States::at_rest(&rest),
-            wheel: State::at_rest(rail + Block::splat(given)),
+            wheel: State::at_rest(rail + given),
             solution: rest,
             unit: vec![Block::default(); size],
         })
@@ -112,13 +105,13 @@ impl LaneState {
     fn advance(&mut self, station: &Station, height_m: Block) -> Block {
         self.eliminate_past();
         let (compliance, deflection) = self.eliminate_unit_force(station);
-        let wheel_free = self.wheel_compliance.mul_add(self.load, self.wheel.inertial());
+        let wheel_free = self.wheels.compliance.mul_add(self.wheels.load_n, self.wheel.inertial());
         let overlap = wheel_free - deflection - height_m;
         let local = Block::splat(station.local_flexibility);
         let force =
-            contact::forces(self.contact, overlap, compliance + self.wheel_compliance + local);
+            contact::forces(&self.wheels, overlap, compliance + self.wheels.compliance + local);
         self.substitute(station.first, force);
-        self.wheel.advance(self.wheel_compliance.subtracted_from(force, wheel_free));
+        self.wheel.advance(self.wheels.compliance.subtracted_from(force, wheel_free));
         force
     }
 
@@ -194,7 +187,7 @@ impl WithSimd for Run<'_> {
     fn with_simd<S: Simd>(self, _: S) -> Vec<Block> {
         let mut motion = self.motion;
         let mut first = self.stations.first().map_or(0, |station| station.first);
-        let mut forces = vec![motion.load];
+        let mut forces = vec![motion.wheels.load_n];
         for (station, &height_m) in self.stations.iter().zip(self.heights_m) {
             // The wheel has left these places behind.
             motion.unit[first..station.first].fill(Block::default());

@@ -1,0 +1,7 @@
+-- Campaigns vary numbers of the description and extensions besides the six parameters.
+
+alter table campaign_case
+    -- What was drawn for the case besides its parameters, by name: JSON object of numbers; null where nothing was, or
+    -- where the case was stored before there was this column.
+    add column drawn text collate "C"
+        constraint drawn_is_a_json_object check (json_typeof(drawn::json) = 'object');
