@@ -26,7 +26,7 @@ pub fn detectability(
     hidden: &Hidden,
 ) -> Result<Option<f64>, CalibrationError> {
     let Some(extension) = in_recording(recording, prepared, scene, hidden) else { return Ok(None) };
-    let values = values(recording, prepared, scene);
+    let values = values(recording, prepared, search, scene);
     let length = signature(prepared, &search.observation, &values, extension)?;
     Ok((length > 0.0).then_some(length))
 }
@@ -67,16 +67,31 @@ pub(crate) fn number(
     recording.sleepers[prepared.first_sleeper + sleeper].id.strip_prefix("SN")?.parse().ok()
 }
 
-/// The unknowns as they truly are.
-fn values(recording: &Recording, prepared: &PreparedRecording, scene: &Scene) -> DVector<f64> {
+/// The unknowns as they truly are. Level and spectrum of the surface are those of the fitted baseline: surfaces
+/// of lines do not have the spectrum of eq. B.6, and a shape is seen against the surface that there is.
+fn values(
+    recording: &Recording,
+    prepared: &PreparedRecording,
+    search: &SearchOutcome,
+    scene: &Scene,
+) -> DVector<f64> {
     let unknowns = &prepared.forward.unknowns;
     let mut values = unknowns.typical();
+    let fitted = &search.baseline.values;
+    for index in unknowns.spectrum() {
+        values[index] = fitted[index];
+    }
+    let mut levels: Vec<f64> = unknowns.level().map(|index| fitted[index]).collect();
+    levels.sort_by(f64::total_cmp);
+    let level = levels[levels.len() / 2];
     for sleeper in 0..prepared.forward.section.sleepers {
         let truth = number(recording, prepared, sleeper).and_then(|n| scene.sleepers.get(n));
         let Some(truth) = truth else { continue };
         values[unknowns.ballast().start + sleeper] = truth.ballast_stiffness_n_m.ln();
         values[unknowns.railpad().start + sleeper] = truth.railpad_stiffness_n_m.ln();
-        values[unknowns.level().start + sleeper] = scene.irregularity_level.ln();
+    }
+    for index in unknowns.level() {
+        values[index] = level;
     }
     let bending: f64 = scene.sleepers.iter().map(|sleeper| sleeper.sleeper_ei_n_m2).sum();
     let global = unknowns.global().start;

@@ -1,5 +1,6 @@
 //! Corrugation: waves of one length on the railhead.
 
+use super::kind::DEPTH_DEVIATION;
 use super::{
     Bound, Class, EffectFamily, Extension, Kind, KindParameter, LookAlikeGroup, PlaceKind,
     Screening,
@@ -21,11 +22,9 @@ pub(super) const KIND: Kind = Kind {
             [2e-2, 0.15],
             5.7e-3,
         ),
-        KindParameter::new("amplitude_m", "m", "amplitude, half of crest to trough").ranges(
-            [2e-7, 5e-6],
-            [5e-6, 1e-4],
-            8e-7,
-        ),
+        KindParameter::new("amplitude_m", "m", "amplitude, half of crest to trough")
+            .ranges([2e-7, 5e-6], [5e-6, 1e-4], 8e-7)
+            .form_deviation(DEPTH_DEVIATION),
         KindParameter::new("bandwidth", "1", "width of the band of wave numbers over its middle")
             .ranges([0.0, 0.3], [0.0, 0.3], 0.0)
             .bound(Bound::Share)

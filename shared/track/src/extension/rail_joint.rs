@@ -1,5 +1,6 @@
 //! A joint of the rail: a dip of its surface, a loss of its bending stiffness, or both.
 
+use super::kind::{DEPTH_DEVIATION, LENGTH_DEVIATION};
 use super::{
     Bound, Class, EffectFamily, Extension, Family, Kind, KindParameter, LookAlikeGroup, PlaceKind,
     Places, Screening, Trials,
@@ -19,9 +20,11 @@ pub(super) const KIND: Kind = Kind {
         KindParameter::new("dip_m", "m", "depth of the dip; negative: a hump")
             .ranges([2e-5, 3e-4], [5e-4, 2e-3], 8e-5)
             .bound(Bound::Any)
+            .form_deviation(DEPTH_DEVIATION)
             .or(0.0),
         KindParameter::new("length_m", "m", "distance over which the dip falls to 1/e")
             .ranges([5e-3, 4e-2], [0.1, 0.5], 2e-2)
+            .form_deviation(LENGTH_DEVIATION)
             .or(2e-2),
         KindParameter::new("dip_exponent", "1", "1: the dip is a kink; 2: it is rounded")
             .ranges([0.7, 3.0], [0.7, 3.0], 1.0)

@@ -1,5 +1,6 @@
 //! A squat: a short hollow of the railhead.
 
+use super::kind::{DEPTH_DEVIATION, LENGTH_DEVIATION};
 use super::{
     Class, EffectFamily, Extension, Family, Kind, KindParameter, LookAlikeGroup, PlaceKind, Places,
     Screening, Trials,
@@ -16,16 +17,12 @@ pub(super) const KIND: Kind = Kind {
     place: PlaceKind::Point,
     measuring_chain: false,
     parameters: &[
-        KindParameter::new("depth_m", "m", "depth of the hollow").ranges(
-            [5e-6, 6e-5],
-            [1e-4, 5e-4],
-            2e-5,
-        ),
-        KindParameter::new("length_m", "m", "length of the hollow").ranges(
-            [2e-3, 1e-2],
-            [2e-2, 6e-2],
-            6e-3,
-        ),
+        KindParameter::new("depth_m", "m", "depth of the hollow")
+            .ranges([5e-6, 6e-5], [1e-4, 5e-4], 2e-5)
+            .form_deviation(DEPTH_DEVIATION),
+        KindParameter::new("length_m", "m", "length of the hollow")
+            .ranges([2e-3, 1e-2], [2e-2, 6e-2], 6e-3)
+            .form_deviation(LENGTH_DEVIATION),
     ],
     look_alikes: &["rail_joint"],
     would_separate: "a look at the railhead, or passes of both directions over the place",

@@ -1,5 +1,6 @@
 //! A flat of the wheel's tread.
 
+use super::kind::LENGTH_DEVIATION;
 use super::{
     Bound, Class, EffectFamily, Extension, Kind, KindParameter, LookAlikeGroup, PlaceKind,
     Screening,
@@ -16,11 +17,9 @@ pub(super) const KIND: Kind = Kind {
     place: PlaceKind::Nowhere,
     measuring_chain: false,
     parameters: &[
-        KindParameter::new("length_m", "m", "length of the flat along the tread").ranges(
-            [1e-3, 8e-3],
-            [2e-2, 8e-2],
-            3.5e-3,
-        ),
+        KindParameter::new("length_m", "m", "length of the flat along the tread")
+            .ranges([1e-3, 8e-3], [2e-2, 8e-2], 3.5e-3)
+            .form_deviation(LENGTH_DEVIATION),
         KindParameter::new(
             "depth_factor",
             "1",

@@ -146,7 +146,8 @@ impl Evidence<'_> {
         let [logarithms, deviations] = calibration.moments();
         let parameters = candidate.free.iter().enumerate().map(|(index, parameter)| {
             let mean = logarithms[first + index].exp();
-            (parameter.name.to_owned(), Estimate { mean, sd: mean * deviations[first + index] })
+            let deviation = deviations[first + index].hypot(parameter.form_deviation);
+            (parameter.name.to_owned(), Estimate { mean, sd: mean * deviation })
         });
         // Of whole numbers each is a candidate of its own.
         let mut assumed = candidate.extension.parameters.clone();
