@@ -1,7 +1,5 @@
 //! Campaigns that vary numbers of the description, from the command line.
 
-#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
-
 use std::collections::HashSet;
 use std::fs;
 use system_tests::run;

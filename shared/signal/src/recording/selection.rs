@@ -150,7 +150,9 @@ mod tests {
     #[test]
     fn passes_that_state_no_rail_are_of_one() {
         let mut passes = passes();
-        passes.iter_mut().for_each(|pass| (pass.rail, pass.axle) = (None, None));
+        for pass in &mut passes {
+            (pass.rail, pass.axle) = (None, None);
+        }
         let path = Path::new("recording.json");
         assert_eq!(Selection::default().of(path, &passes).unwrap().len(), 4);
         let left = Selection { rail: Some("left".to_owned()), axle: None };
