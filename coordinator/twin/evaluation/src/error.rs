@@ -41,9 +41,10 @@ pub enum Error {
     GainUnknown,
     /// The recording belongs to another track or vehicle.
     #[error(
-        "{} {}, the models are of {}; train models of such a track", .0.quantity, .0.found(), .0.known()
+        "{} {}, the models are of {}; train models of such a track, or of a campaign that varies this number",
+        .0.quantity, .0.found(), .0.known()
     )]
-    OtherTrack(#[from] OtherTrack),
+    OtherTrack(OtherTrack),
     /// There is no model for these speeds and this feature set.
     #[error("the {feature} model for {} km/h is missing; train it", join(speeds_km_h))]
     NoModel {
@@ -86,6 +87,13 @@ pub enum Error {
     /// Error of the models or of the training set.
     #[error(transparent)]
     Surrogate(#[from] tracktwin_surrogate::Error),
+}
+
+impl From<OtherTrack> for Error {
+    // Not a source: the message contains its numbers.
+    fn from(other: OtherTrack) -> Self {
+        Self::OtherTrack(other)
+    }
 }
 
 fn join(speeds: &[f64]) -> String {
