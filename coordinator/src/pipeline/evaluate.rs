@@ -89,8 +89,8 @@ impl Evaluator {
         let ranges: Vec<_> = self.experiment.design_axes.iter().map(range).collect();
         (!ranges.is_empty()).then(|| {
             format!(
-                "the models do not know which value these numbers of the description have; their intervals \
-                 contain the uncertainty: {}",
+                "the models were trained on cases that differ in these numbers of the description; their intervals \
+                 contain this uncertainty: {}",
                 ranges.join(", ")
             )
         })

@@ -50,9 +50,9 @@ impl Selection {
     ) -> Result<Vec<(usize, &'a PassEntry)>, RecordingError> {
         let fail = |fault| Err(RecordingError::new(manifest, "passes", Fault::Selection(fault)));
         let stated = |pass: &'a PassEntry| pass.rail.as_deref().or(Some("not stated"));
-        let rails = names(passes.iter().map(stated));
-        if self.rail.is_none() && rails.len() > 1 {
-            return fail(SelectionFault::SeveralRails { rails: rails.join(", ") });
+        let different = names(passes.iter().map(stated));
+        if self.rail.is_none() && different.len() > 1 {
+            return fail(SelectionFault::SeveralRails { rails: different.join(", ") });
         }
         let rails = names(passes.iter().map(|pass| pass.rail.as_deref()));
         let is_of = |pass: &PassEntry| {
@@ -83,10 +83,10 @@ impl Selection {
         Ok(selected)
     }
 
-    /// Text after the name of a recording: ` rail left axle 1`.
+    /// Text after the name of a recording: `, rail left, axle 1`.
     pub(super) fn suffix(&self) -> String {
         let part = |what: &str, name: &Option<String>| {
-            name.as_ref().map(|name| format!(" {what} {name}")).unwrap_or_default()
+            name.as_ref().map(|name| format!(", {what} {name}")).unwrap_or_default()
         };
         part("rail", &self.rail) + &part("axle", &self.axle)
     }

@@ -25,12 +25,7 @@ pub(super) struct Parameters {
 enum Range {
     Fixed(f64),
     Between([f64; 2]),
-    Scaled {
-        low: f64,
-        high: f64,
-        #[serde(default)]
-        scale: Scale,
-    },
+    Scaled { low: f64, high: f64, scale: Scale },
 }
 
 impl Range {
@@ -119,6 +114,12 @@ impl<'de> Visitor<'de> for Section {
                     nested.collect(key, &mut parameters.design).map_err(A::Error::custom)?;
                 }
             }
+        }
+        // A quoted key and a dotted one can name the same number.
+        let numbers = || parameters.design.iter().map(|(number, _)| number);
+        if let Some(twice) = numbers().find(|it| numbers().filter(|other| other == it).count() > 1)
+        {
+            return Err(A::Error::custom(format!("duplicate key `{}`", twice.key())));
         }
         Ok(parameters)
     }

@@ -125,6 +125,7 @@ fn numbers_of_the_description_are_axes_or_values() {
         ("vehicle.mass_kg = 0.044", "parameters.vehicle.mass_kg: 0.044 kg cannot be"),
         ("vehicle.mass_kg = \"heavy\"", "expected a number, [low, high] or"),
         ("mass_kg = 44", "such as vehicle.mass_kg"),
+        ("vehicle.mass_kg = 44\n\"vehicle.mass_kg\" = [42, 46]", "duplicate key `vehicle.mass_kg`"),
         ("track.sleeper.rail_seat_m = [0, 0.3]", "lies outside the half sleeper of 0.24 m"),
     ] {
         let found = with(section).unwrap_err().to_string();
