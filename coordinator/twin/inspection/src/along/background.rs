@@ -98,27 +98,33 @@ pub(crate) fn whitened(
     background: &Background,
     [low_hz, high_hz]: [f64; 2],
 ) -> Vec<Complex64> {
-    let (samples, rate) = (signal.samples(), signal.sample_rate_hz());
-    let length = smooth_length(samples.len());
-    let mean = samples.iter().sum::<f64>() / samples.len() as f64;
-    let fade = ((FADE_S * rate) as usize).min(samples.len() / 4).max(1);
-    let mut lines = vec![Complex64::ZERO; length];
-    for (index, (line, value)) in lines.iter_mut().zip(samples).enumerate() {
-        let edge = index.min(samples.len() - 1 - index);
-        let weight =
-            if edge < fade { 0.5 - 0.5 * (PI * edge as f64 / fade as f64).cos() } else { 1.0 };
-        line.re = weight * (value - mean);
-    }
-    let mut planner = FftPlanner::new();
-    planner.plan_fft_forward(length).process(&mut lines);
+    let rate = signal.sample_rate_hz();
+    let mut lines = faded_lines(signal);
+    let length = lines.len();
     let scale = (2.0 / (high_hz - low_hz)).sqrt() / length as f64;
     for (bin, line) in lines.iter_mut().enumerate() {
         let frequency = bin as f64 * rate / length as f64;
         let inside = (low_hz..=high_hz).contains(&frequency) && 2 * bin < length;
         *line *= if inside { scale / background.at(frequency).sqrt() } else { 0.0 };
     }
-    planner.plan_fft_inverse(length).process(&mut lines);
-    lines.truncate(samples.len());
+    FftPlanner::new().plan_fft_inverse(length).process(&mut lines);
+    lines.truncate(signal.samples().len());
+    lines
+}
+
+/// Spectral lines of a signal that fades in and out, without its mean, at a smooth length.
+pub(crate) fn faded_lines(signal: &Signal) -> Vec<Complex64> {
+    let samples = signal.samples();
+    let mean = samples.iter().sum::<f64>() / samples.len() as f64;
+    let fade = ((FADE_S * signal.sample_rate_hz()) as usize).min(samples.len() / 4).max(1);
+    let mut lines = vec![Complex64::ZERO; smooth_length(samples.len())];
+    for (index, (line, value)) in lines.iter_mut().zip(samples).enumerate() {
+        let edge = index.min(samples.len() - 1 - index);
+        let weight =
+            if edge < fade { 0.5 - 0.5 * (PI * edge as f64 / fade as f64).cos() } else { 1.0 };
+        line.re = weight * (value - mean);
+    }
+    FftPlanner::new().plan_fft_forward(lines.len()).process(&mut lines);
     lines
 }
 

@@ -4,6 +4,7 @@
 
 mod background;
 mod energy;
+mod innovation;
 mod line;
 mod surface;
 mod tail;
@@ -14,6 +15,7 @@ pub use background::median;
 pub(crate) use background::{Background, hann, whitened};
 pub use energy::separates_wavelengths;
 pub(crate) use energy::{Energy, by_speed, speed_m_s};
+pub(crate) use innovation::Innovations;
 pub(crate) use line::{Line, Ruler, Spectrum, amplitude, on_even_places};
 pub(crate) use surface::Surface;
 pub(crate) use tail::{

@@ -1,5 +1,6 @@
 //! Local impacts: they occur at the same position of the track in every pass and at every speed.
 
+use super::kink::{Kink, kinks};
 use super::repeated::{Cells, ImpactKind, cells};
 use super::shape::{Form, Observed, Shape, fit};
 use crate::along::{bonferroni, combine_dependent_p_values, separates_wavelengths};
@@ -33,7 +34,8 @@ pub struct Impact {
     pub shape: Option<Shape>,
 }
 
-/// Detects impacts with a false-alarm rate of `alpha`; the most significant one comes first.
+/// Detects impacts by their power, and kinks, each with a false-alarm rate of `alpha`. Impacts that stand out by
+/// their power come first, and the more significant ones first.
 ///
 /// Positions in `except` (`[from, to]` in m) are skipped.
 pub fn impacts(recording: &Recording, alpha: f64, except: &[[f64; 2]]) -> Vec<Impact> {
@@ -63,6 +65,13 @@ pub fn impacts(recording: &Recording, alpha: f64, except: &[[f64; 2]]) -> Vec<Im
             if apart(impact.x_m.0) && allowed(impact.x_m.0) {
                 found.push(impact);
             }
+        }
+    }
+    for kink in kinks(recording, alpha) {
+        let apart = |other: &Impact| (other.x_m.0 - kink.x_m.0).abs() > 0.5 * recording.spacing_m;
+        if found.len() < IMPACTS_MAX && allowed(kink.x_m.0) && found.iter().all(apart) {
+            let Kink { x_m, ln_p, power_ratio, shape } = kink;
+            found.push(Impact { x_m, ln_p, power_ratio, shape: Some(shape) });
         }
     }
     let loudest = found.iter().map(|impact| impact.power_ratio).fold(0.0, f64::max);

@@ -3,7 +3,9 @@
 //! This module detects impacts that repeat at one position (`squat`, the dip of a `rail_joint`) and
 //! `corrugation`. The module `wheel` detects effects that repeat with the wheel.
 
+mod coherent;
 mod corrugation;
+mod kink;
 mod local;
 mod repeated;
 mod shape;

@@ -138,6 +138,17 @@ fn spectrum(segment: &[f64], before: usize, rate: f64) -> (Vec<f64>, f64) {
 }
 
 impl Form {
+    /// Height in m of a shape of 1 m depth and the length `l` in m, at a distance in m from its middle.
+    pub(super) fn height(self, distance: f64, length: f64) -> f64 {
+        match self {
+            Self::Dip => (-distance.abs() / length).exp(),
+            Self::Hollow if distance.abs() < 0.5 * length => {
+                0.5 * (1.0 + (TAU * distance / length).cos())
+            }
+            Self::Hollow => 0.0,
+        }
+    }
+
     /// `|Z(k)|` in m2 for a depth of 1 m and the length `l` in m, at `k` cycles/m.
     fn transform(self, length: f64, wave_number: f64) -> f64 {
         let turns = wave_number * length;
@@ -171,10 +182,10 @@ impl Form {
 
 /// Fit of a form with fixed length: sum of squares, length and depth in m.
 #[derive(Clone)]
-struct Fitted {
-    squares: f64,
-    length: f64,
-    depth: f64,
+pub(super) struct Fitted {
+    pub squares: f64,
+    pub length: f64,
+    pub depth: f64,
 }
 
 /// Fits form and size to all observed blows together; `None` if there are too few bands.
@@ -195,24 +206,29 @@ pub(crate) fn fit(recording: &Recording, observed: &[Observed]) -> Option<Shape>
         });
         [felt, point].concat()
     };
-    let [dip, hollow] = [Form::Dip, Form::Hollow].map(grid);
-    let (form, best, other) = if best_of(&dip).squares < best_of(&hollow).squares {
-        (Form::Dip, dip, hollow)
+    let [dips, hollows] = [Form::Dip, Form::Hollow].map(grid);
+    Some(most_likely(dips, hollows, surface.height_deviation))
+}
+
+/// The more likely of two forms, from fits of all their lengths.
+pub(super) fn most_likely(dips: Vec<Fitted>, hollows: Vec<Fitted>, height_deviation: f64) -> Shape {
+    let (form, best, other) = if best_of(&dips).squares < best_of(&hollows).squares {
+        (Form::Dip, dips, hollows)
     } else {
-        (Form::Hollow, hollow, dip)
+        (Form::Hollow, hollows, dips)
     };
     let chosen = best_of(&best);
     let (length, length_deviation) = spread(&best, chosen.squares, |fitted| fitted.length);
     let (depth, depth_deviation) = spread(&best, chosen.squares, |fitted| fitted.depth);
     let length_deviation = length_deviation.hypot(LENGTH_DEVIATION * length);
-    let depth_deviation = depth_deviation.hypot(surface.height_deviation * depth);
-    Some(Shape {
+    let depth_deviation = depth_deviation.hypot(height_deviation * depth);
+    Shape {
         form,
         length_m: (length, length_deviation),
         depth_m: (depth, depth_deviation),
         slope_rad: 2.0 * chosen.depth / chosen.length,
         lead: 0.5 * (best_of(&other).squares - chosen.squares),
-    })
+    }
 }
 
 fn best_of(grid: &[Fitted]) -> &Fitted {

@@ -20,8 +20,8 @@ use tracktwin_track::extension::POSITION_ERROR;
 /// False-alarm rate of all tests together, for a recording without defects.
 pub const FALSE_ALARMS: f64 = 0.02;
 
-/// False-alarm rate of each of the nine kinds of test.
-const EACH_TEST: f64 = FALSE_ALARMS / 9.0;
+/// False-alarm rate of each of the ten kinds of test.
+const EACH_TEST: f64 = FALSE_ALARMS / 10.0;
 
 /// Distance in sleeper spacings around a position at which the wheel's flat hits the rail in every pass;
 /// the flat dominates the signal there.
