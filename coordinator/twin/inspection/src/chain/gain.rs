@@ -13,8 +13,14 @@ const USUAL_DB: f64 = 0.2;
 /// third or fourth power of the wave number.
 const SPEED_POWER: f64 = 3.0;
 const SPEED_POWER_UNSURE: f64 = 1.0;
-/// Largest difference between the gains of the bands in dB; a larger difference is not a gain error.
+/// Largest difference between the gains of the bands in dB; a larger difference is not a gain error, unless the
+/// bands are known no better.
 const UNIFORM_DB: f64 = 0.6;
+/// Standard deviations by which the gain of a band may differ from that of all bands.
+const BAND_DEVIATIONS: f64 = 2.5;
+/// Neighbouring stretches are not independent where the track rings across several of them: standard errors of
+/// the mean over a band are this many times larger.
+const RINGING: f64 = 2.0;
 /// Smallest number of stretches for a mean and its standard deviation.
 const STRETCHES_MIN: usize = 6;
 
@@ -30,6 +36,8 @@ pub struct Gain {
     pub gain_db: (f64, f64),
     /// Largest difference between bands in dB.
     pub spread_db: f64,
+    /// Largest difference of a band from all bands in its standard deviations.
+    pub spread_deviations: f64,
     /// Natural logarithm of the probability of such a difference among all passes without a gain error.
     pub ln_p: f64,
 }
@@ -37,8 +45,9 @@ pub struct Gain {
 impl Gain {
     /// Whether this is a gain error: the same in every band, and improbable (`alpha`) otherwise.
     pub fn is_error(&self, alpha: f64) -> bool {
-        let uniform = self.spread_db < UNIFORM_DB.max(0.2 * self.gain_db.0.abs());
-        uniform && self.ln_p <= alpha.ln()
+        let is_narrow = self.spread_db < UNIFORM_DB.max(0.2 * self.gain_db.0.abs());
+        let is_uniform = is_narrow || self.spread_deviations < BAND_DEVIATIONS;
+        is_uniform && self.ln_p <= alpha.ln()
     }
 }
 
@@ -91,18 +100,24 @@ fn gain(group: &[usize], this: usize, bands: &[Vec<f64>], usual_db: f64) -> Opti
     if count < STRETCHES_MIN {
         return None;
     }
-    let all: Vec<f64> = (0..count)
-        .map(|i| bands.iter().map(|band| band[i]).sum::<f64>() / bands.len() as f64)
-        .collect();
-    let (mean, deviation) = mean_and_deviation(&all);
-    let means: Vec<f64> = bands.iter().map(|band| mean_and_deviation(band).0).collect();
-    let ends = means.iter().fold([f64::MAX, f64::MIN], |e, m| [e[0].min(*m), e[1].max(*m)]);
+    let each: Vec<(f64, f64)> = bands.iter().map(|band| mean_and_deviation(band)).collect();
+    let variance = |(_, error): &(f64, f64)| usual_db.powi(2) + (RINGING * error).powi(2);
+    let weights: Vec<f64> = each.iter().map(|band| 1.0 / variance(band)).collect();
+    let weight: f64 = weights.iter().sum();
+    let over_bands = |stretch: usize| {
+        bands.iter().zip(&weights).map(|(band, own)| own * band[stretch]).sum::<f64>() / weight
+    };
+    let (mean, deviation) = mean_and_deviation(&(0..count).map(over_bands).collect::<Vec<f64>>());
+    let apart = |band: &(f64, f64)| (band.0 - mean).abs() / variance(band).sqrt();
+    let spread_deviations = each.iter().map(apart).fold(0.0, f64::max);
+    let ends = each.iter().fold([f64::MAX, f64::MIN], |e, (m, _)| [e[0].min(*m), e[1].max(*m)]);
     let beyond = (mean.abs() - usual_db) / deviation.max(1e-6);
     // Two-sided.
     let ln_p = (ln_student_tail(count as f64 - 1.0, beyond) + 2f64.ln()).min(0.0);
     let gain_db = (mean, deviation);
     let (pass, passes) = (group[this], group.len());
-    Some(Gain { pass, passes, gain_db, spread_db: ends[1] - ends[0], ln_p })
+    let spread_db = ends[1] - ends[0];
+    Some(Gain { pass, passes, gain_db, spread_db, spread_deviations, ln_p })
 }
 
 /// Mean speed of a pass in m/s, from its positions.
