@@ -48,7 +48,8 @@ pub(crate) fn sentence(
             )
         };
     };
-    let others = accepted.map(|other| format!(" Also: {}", named(other, sleepers)));
+    let others = accepted.filter(|other| !are_alike(first, other));
+    let others = others.map(|other| format!(" Also: {}", named(other, sleepers)));
     let found = capital(&named(first, sleepers)) + &rival(first, hypotheses);
     let found = found + &others.collect::<String>();
     [found, gained(fit), biased(bias)].concat()
@@ -75,7 +76,7 @@ fn named(hypothesis: &Hypothesis, sleepers: &[String]) -> String {
 /// share one probability; a hypothesis that is probable in addition to the first is another effect.
 fn rival(first: &Hypothesis, hypotheses: &[Hypothesis]) -> String {
     let is_rival = |other: &&Hypothesis| {
-        !other.accepted
+        (!other.accepted || are_alike(first, other))
             && other.physics != first.physics
             && other.probability >= RIVAL_MIN
             && first.probability + other.probability <= 1.0 + ROUNDING
@@ -89,6 +90,13 @@ fn rival(first: &Hypothesis, hypotheses: &[Hypothesis]) -> String {
         " It could also be {name} ({percent:.0} %). To tell them apart: {}.",
         first.would_separate
     )
+}
+
+/// Whether an unknown element and the kind that models it are two names of one finding.
+fn are_alike(first: &Hypothesis, other: &Hypothesis) -> bool {
+    first.physics == UNKNOWN
+        && first.look_alikes.contains(&other.physics)
+        && first.location == other.location
 }
 
 /// Description of unknown physics: its port, the family that it is most like, and its behaviour.
@@ -263,6 +271,27 @@ mod tests {
             " It could also be subgrade_layer (15 %). To tell them apart: passes with another wheel \
              load."
         );
+    }
+
+    #[test]
+    fn an_unknown_element_and_the_kind_that_models_it_are_one_finding() {
+        let at = Location { x_m: [1.75, 1.75], sleepers: vec!["SN14".to_owned()] };
+        let layer = Hypothesis {
+            probability: 0.34,
+            ..Hypothesis::accepted("subgrade_layer", Some(at.clone()))
+        };
+        let unknown = Hypothesis {
+            probability: 0.63,
+            look_alikes: vec!["subgrade_layer".to_owned()],
+            would_separate: "a hammer test".to_owned(),
+            ..Hypothesis::accepted("unknown_physics", Some(at))
+        };
+        let rival = rival(&unknown, &[unknown.clone(), layer.clone()]);
+        assert_eq!(
+            rival,
+            " It could also be subgrade_layer (34 %). To tell them apart: a hammer test."
+        );
+        assert!(are_alike(&unknown, &layer) && !are_alike(&layer, &unknown));
     }
 
     #[test]

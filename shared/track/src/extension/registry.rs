@@ -50,6 +50,8 @@ pub static WHEEL_FLAT: &Kind = &super::wheel_flat::KIND;
 pub static WHEEL_OUT_OF_ROUND: &Kind = &super::wheel_out_of_round::KIND;
 /// Cracked sleeper.
 pub static CRACKED_SLEEPER: &Kind = &super::cracked_sleeper::KIND;
+/// Layer of subgrade.
+pub static SUBGRADE_LAYER: &Kind = &super::subgrade_layer::KIND;
 /// Flexible axle box.
 pub static FLEXIBLE_AXLE_BOX: &Kind = &super::flexible_axle_box::KIND;
 /// Corrugation.

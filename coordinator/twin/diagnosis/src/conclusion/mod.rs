@@ -20,7 +20,9 @@ use std::collections::BTreeMap;
 use tracktwin_inspection::Inspection;
 use tracktwin_inspection::chain::{LossOfContact, PassDefect};
 use tracktwin_signal::recording::Recording;
-use tracktwin_track::extension::{EffectFamily, FLEXIBLE_AXLE_BOX, Kind, LookAlikeGroup};
+use tracktwin_track::extension::{
+    EffectFamily, FLEXIBLE_AXLE_BOX, Kind, LookAlikeGroup, SUBGRADE_LAYER,
+};
 
 /// Largest probability if no held-out speed could be tested: at a single speed, structure and geometry have
 /// the same effect.
@@ -78,6 +80,7 @@ impl Evidence<'_> {
             self.search.accepted.iter().map(|candidate| candidate.kind.physics).collect();
         add_siblings(&mut hypotheses, &fitted);
         add_wheel_mode(&mut hypotheses);
+        add_resonator(&mut hypotheses, unknown_max);
         add_families(&mut hypotheses, most);
         hypotheses.sort_by(|a, b| {
             b.probability.total_cmp(&a.probability).then(b.accepted.cmp(&a.accepted))
@@ -262,6 +265,30 @@ fn add_wheel_mode(hypotheses: &mut Vec<Hypothesis>) {
     hypotheses.push(mode);
 }
 
+/// Divides the probability of an accepted layer under a single sleeper between it and a mass on a spring elsewhere
+/// in the track, which no kind describes: an absorber on the rail has the same signature. A subgrade does not change
+/// from one sleeper to the next, so that the unknown element comes first; the layer stays in the model.
+fn add_resonator(hypotheses: &mut Vec<Hypothesis>, unknown_max: f64) {
+    let is_single = |it: &Hypothesis| {
+        let sleepers = it.location.as_ref().map_or(0, |place| place.sleepers.len());
+        it.accepted && it.physics == SUBGRADE_LAYER.physics && sleepers == 1
+    };
+    let mut added = Vec::new();
+    for layer in hypotheses.iter_mut().filter(|it| is_single(it)) {
+        added.push(Hypothesis {
+            physics: UNKNOWN.to_owned(),
+            probability: (NAMED_SHARE * layer.probability).min(unknown_max),
+            port: Some(PortPlace::Seats(Vec::new()).name().to_owned()),
+            parameters: BTreeMap::new(),
+            assumed: BTreeMap::new(),
+            look_alikes: vec![layer.physics.clone()],
+            ..layer.clone()
+        });
+        layer.probability *= 1.0 - NAMED_SHARE;
+    }
+    hypotheses.extend(added);
+}
+
 /// Sets the probability of each hypothesis's family at its location; its members exclude each other there.
 fn add_families(hypotheses: &mut [Hypothesis], most: f64) {
     let all: Vec<_> = hypotheses
@@ -302,4 +329,29 @@ pub(crate) fn airborne(lost: Option<&LossOfContact>) -> String {
 
 fn names(kind: &Kind) -> Vec<String> {
     kind.look_alikes.iter().map(|&name| name.to_owned()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn layer(sleepers: &[&str]) -> Hypothesis {
+        let sleepers = sleepers.iter().map(|id| (*id).to_owned()).collect();
+        let place = Location { x_m: [1.0, 1.0], sleepers };
+        Hypothesis { probability: 0.96, ..Hypothesis::accepted("subgrade_layer", Some(place)) }
+    }
+
+    #[test]
+    fn a_layer_under_one_sleeper_is_first_of_all_a_mass_on_a_spring() {
+        let mut one = vec![layer(&["SN8"])];
+        add_resonator(&mut one, 0.97);
+        let [layer_again, unknown] = &one[..] else { panic!("{one:?}") };
+        assert!((unknown.probability - 0.624).abs() < 1e-9 && unknown.accepted);
+        assert!((layer_again.probability - 0.336).abs() < 1e-9 && layer_again.accepted);
+        assert_eq!(unknown.physics, UNKNOWN);
+        assert_eq!(unknown.family, layer_again.family);
+        let mut run = vec![layer(&["SN8", "SN9"])];
+        add_resonator(&mut run, 0.97);
+        assert_eq!(run.len(), 1);
+    }
 }

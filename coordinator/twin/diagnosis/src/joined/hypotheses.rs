@@ -101,9 +101,12 @@ impl Whole<'_> {
         known.family_probability = known.family_probability.max(other.family_probability);
         known.detectability = known.detectability.hypot(other.detectability);
         known.log_evidence += other.log_evidence;
+        let kind = Kind::from_name(&known.physics);
         for (name, estimate) in &mut known.parameters {
             if let Some(further) = other.parameters.get(name) {
-                *estimate = mean(*estimate, *further);
+                let form =
+                    kind.and_then(|kind| kind.parameter(name)).map_or(0.0, |it| it.form_deviation);
+                *estimate = mean_of_one_form(*estimate, *further, form);
             }
         }
         let (Some(place), Some(further)) = (&mut known.location, &other.location) else { return };
@@ -111,6 +114,16 @@ impl Whole<'_> {
         let is_there = |id: &&String| place.sleepers.contains(id) || further.sleepers.contains(id);
         place.sleepers = self.ids.iter().filter(is_there).cloned().collect();
     }
+}
+
+/// Mean of two estimates of one shape whose unknown form gives both the same relative deviation `form`.
+fn mean_of_one_form(one: Estimate, other: Estimate, form: f64) -> Estimate {
+    let alone = |it: Estimate| {
+        let variance = it.sd.powi(2) - (form * it.mean).powi(2);
+        Estimate { sd: variance.max(0.0).sqrt(), ..it }
+    };
+    let joined = mean(alone(one), alone(other));
+    Estimate { sd: joined.sd.hypot(form * joined.mean), ..joined }
 }
 
 /// Mean of two estimates, weighted by their variances; its standard deviation includes their difference.
@@ -122,4 +135,19 @@ pub(super) fn mean(one: Estimate, other: Estimate) -> Estimate {
     let mean = (a * one.mean + b * other.mean) / (a + b);
     let spread = (a * (one.mean - mean).powi(2) + b * (other.mean - mean).powi(2)) / (a + b);
     Estimate { mean, sd: (1.0 / (a + b) + spread).sqrt() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_sections_know_the_form_of_a_shape_no_better_than_one() {
+        let [one, other] = [10.0, 10.0].map(|mean| Estimate { mean, sd: 2.5 });
+        assert!((mean(one, other).sd - 2.5 / 2f64.sqrt()).abs() < 1e-12);
+        // Of 2.5, 1.5 is the fit's and 2 the form's.
+        let joined = mean_of_one_form(one, other, 0.2);
+        assert!((joined.sd - (1.5 / 2f64.sqrt()).hypot(2.0)).abs() < 1e-12, "{joined:?}");
+        assert!((joined.mean - 10.0).abs() < 1e-12);
+    }
 }
