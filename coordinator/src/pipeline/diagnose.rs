@@ -87,8 +87,9 @@ pub async fn diagnose(
     check_track(recording, &track.design)?;
     watch("first look", 0.0);
     let mut inspection = compute(|| inspect(recording));
+    let cleared = compute(|| inspection.without_hum(recording));
     let mut prepared =
-        match compute(|| PreparedRecording::new(recording, track, &inspection.misplaced)) {
+        match compute(|| PreparedRecording::new(&cleared, track, &inspection.misplaced)) {
             Ok(prepared) => prepared,
             Err(reason) => {
                 inspection.forget(allowed);

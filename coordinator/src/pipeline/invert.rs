@@ -52,6 +52,7 @@ pub async fn invert(
     let inspection = compute(|| inspect(recording));
     let left_out = inspection.misplaced_note(recording);
     let all_passes = recording.passes.len();
+    let recording = &*inspection.without_hum(recording);
     let recording = &inspection.placed(recording);
     let prepared = compute(|| sections(recording, track))?;
     let with_physics = |prepared: PreparedRecording| {

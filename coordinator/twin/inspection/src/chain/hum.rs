@@ -2,6 +2,8 @@
 
 use crate::along::{Line, Spectrum, bonferroni, by_speed, ln_gamma_tail, speed_m_s};
 use rustfft::num_complex::Complex64;
+use std::f64::consts::TAU;
+use tracktwin_signal::Signal;
 use tracktwin_signal::recording::{Pass, Recording};
 
 /// Mains frequencies in Hz and number of tested harmonics: railways of central Europe (the third harmonic
@@ -68,6 +70,47 @@ pub fn hum(recording: &Recording, turn_m: Option<f64>, alpha: f64) -> Vec<Hum> {
     found.retain(|line: &Hum| line.ln_p <= alpha.ln());
     found.sort_by(|a, b| a.ln_p.total_cmp(&b.ln_p));
     found
+}
+
+/// The recording without these lines. In every pass, or every segment of a long one, the tone that fits best within
+/// the drift of the mains is subtracted.
+pub fn without_hum(recording: &Recording, lines: &[Hum]) -> Recording {
+    let mut cleared = recording.clone();
+    for pass in &mut cleared.passes {
+        let rate_hz = pass.signal.sample_rate_hz();
+        let segments = ((pass.signal.duration_s() / SEGMENT_S) as usize).max(1);
+        let mut samples = pass.signal.samples().to_vec();
+        let length = samples.len().div_ceil(segments);
+        for part in samples.chunks_mut(length) {
+            lines.iter().for_each(|line| subtract_tone(part, line.frequency_hz, rate_hz));
+        }
+        if let Ok(signal) = Signal::new(rate_hz, samples) {
+            pass.signal = signal;
+        }
+    }
+    cleared
+}
+
+/// Subtracts the strongest tone within the drift of the mains from `samples`.
+fn subtract_tone(samples: &mut [f64], frequency_hz: f64, rate_hz: f64) {
+    let turns = |frequency: f64| {
+        let step = Complex64::from_polar(1.0, TAU * frequency / rate_hz);
+        std::iter::successors(Some(Complex64::ONE), move |turn| Some(turn * step))
+    };
+    let fitted = |frequency: f64| {
+        let pairs = samples.iter().zip(turns(frequency));
+        let sum: Complex64 = pairs.map(|(sample, turn)| turn.conj() * sample).sum();
+        (frequency, 2.0 * sum / samples.len() as f64)
+    };
+    // A quarter of the resolution.
+    let step_hz = 0.25 * rate_hz / samples.len() as f64;
+    let reach = (DRIFT_HZ * frequency_hz / 50.0 / step_hz) as i32;
+    let tones = (-reach..=reach).map(|step| fitted(frequency_hz + f64::from(step) * step_hz));
+    let best = tones.max_by(|a, b| a.1.norm_sqr().total_cmp(&b.1.norm_sqr()));
+    let Some((frequency, tone)) = best else { return };
+    for (sample, turn) in samples.iter_mut().zip(turns(frequency)) {
+        *sample -= (tone * turn).re;
+    }
 }
 
 /// The line nearest to a mains frequency, and the number of tested bins.

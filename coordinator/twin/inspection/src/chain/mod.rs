@@ -20,7 +20,7 @@ pub use clipping::{Clipping, clipping};
 pub(crate) use contact::expected_m_s2;
 pub use contact::{LossOfContact, PassLoss, loss_of_contact};
 pub use gain::{Gain, gains};
-pub use hum::{Hum, hum};
+pub use hum::{Hum, hum, without_hum};
 pub(crate) use offset::misplaced;
 pub use offset::{Offset, Offsets, offsets};
 pub use pass_defect::{PassDefect, pass_defects};

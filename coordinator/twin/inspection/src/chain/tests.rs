@@ -146,6 +146,26 @@ fn a_band_that_rings_differently_in_every_pass_does_not_speak_against_a_gain() {
 }
 
 #[test]
+fn without_its_hum_a_recording_is_what_it_was() {
+    let humming = measured(5, &|pass, samples, _| {
+        for (index, sample) in samples.iter_mut().enumerate() {
+            let turns = 150.05 * index as f64 / Rolled::RATE_HZ + 0.3 * pass as f64;
+            *sample += 2.0 * (TAU * turns).cos();
+        }
+    });
+    let found = hum(&humming, None, ALPHA);
+    assert_eq!(found[0].frequency_hz, 150.0);
+    let cleared = without_hum(&humming, &found[..1]);
+    let still = Rolled::faultless(5).recording();
+    for (with, without) in cleared.passes.iter().zip(&still.passes) {
+        let pairs = with.signal.samples().iter().zip(without.signal.samples());
+        let square = pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>() / with.signal.len() as f64;
+        // The tone has a mean square of two.
+        assert!(square < 0.1, "{square}");
+    }
+}
+
+#[test]
 fn a_pass_with_another_gain_is_told_from_one_with_another_spectrum() {
     let louder = measured(3, &|pass, samples, _| {
         if pass == 1 {

@@ -10,10 +10,11 @@ use self::findings::{
     impact_finding, offset_finding, order_finding, scale_finding,
 };
 use crate::along::by_speed;
-use crate::chain::{Gain, LossOfContact, Offsets, PassDefect};
+use crate::chain::{Gain, Hum, LossOfContact, Offsets, PassDefect};
 use crate::finding::{Finding, Place};
 use crate::wheel::{Comb, Flat, Order};
 use crate::{chain, impact, wheel};
+use std::borrow::Cow;
 use tracktwin_signal::recording::Recording;
 use tracktwin_track::extension::POSITION_ERROR;
 
@@ -43,6 +44,8 @@ pub struct Inspection {
     pub pass_defects: Vec<PassDefect>,
     /// Noise floor of each pass in (m/s2)2/Hz; `None` if a pass is too short or constant.
     pub noise_floors: Vec<Option<f64>>,
+    /// Lines of the mains in the recording.
+    pub hum: Vec<Hum>,
     /// Gains between passes at one speed.
     pub gains: Vec<Gain>,
     /// Offsets between passes at one speed.
@@ -65,6 +68,15 @@ impl Inspection {
     pub fn ignore(&mut self) {
         self.findings.clear();
         self.flat = None;
+    }
+
+    /// The recording without the lines of the mains, which no track model contains.
+    pub fn without_hum<'a>(&self, recording: &'a Recording) -> Cow<'a, Recording> {
+        if self.hum.is_empty() {
+            Cow::Borrowed(recording)
+        } else {
+            Cow::Owned(chain::without_hum(recording, &self.hum))
+        }
     }
 
     /// The recording without its misplaced passes.
@@ -122,7 +134,8 @@ pub fn inspect(recording: &Recording) -> Inspection {
     let is_flight_known = chain::expected_m_s2(recording).is_some();
     let cut = clipping_finding(&clipping, recording.passes.len(), unit, is_flight_known);
     let mut findings: Vec<Finding> = cut.into_iter().collect();
-    findings.extend(hum_finding(&chain::hum(recording, turn_m, EACH_TEST), unit));
+    let hum = chain::hum(recording, turn_m, EACH_TEST);
+    findings.extend(hum_finding(&hum, unit));
     findings.extend(gains.iter().filter(|gain| gain.is_error(EACH_TEST)).map(gain_finding));
     let scale = chain::scale(recording).filter(|scale| scale.ln_p <= EACH_TEST.ln());
     findings.extend(scale.as_ref().map(scale_finding));
@@ -146,6 +159,7 @@ pub fn inspect(recording: &Recording) -> Inspection {
         loss_of_contact,
         pass_defects: chain::pass_defects(recording, &offsets),
         noise_floors: chain::noise_floors(recording),
+        hum,
         gains,
         offsets,
         misplaced,
