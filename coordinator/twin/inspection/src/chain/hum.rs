@@ -82,7 +82,9 @@ pub fn without_hum(recording: &Recording, lines: &[Hum]) -> Recording {
         let mut samples = pass.signal.samples().to_vec();
         let length = samples.len().div_ceil(segments);
         for part in samples.chunks_mut(length) {
-            lines.iter().for_each(|line| subtract_tone(part, line.frequency_hz, rate_hz));
+            for line in lines {
+                subtract_tone(part, line.frequency_hz, rate_hz);
+            }
         }
         if let Ok(signal) = Signal::new(rate_hz, samples) {
             pass.signal = signal;
