@@ -62,7 +62,7 @@ pub(super) const fn verdict(verdict: Verdict) -> (&'static str, &'static str, &'
         Verdict::UnknownPhysics => (
             "unknown",
             "unknown physics",
-            "the recording contains physics that no kind in the catalogue explains",
+            "the recording contains physics that the catalogue lacks",
         ),
         Verdict::MeasurementChain => (
             "chain",

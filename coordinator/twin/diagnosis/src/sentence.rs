@@ -115,7 +115,7 @@ fn unknown(hypothesis: &Hypothesis) -> String {
     let is_family = |kind: &&Kind| hypothesis.family.as_deref() == Some(kind.family.name());
     let like = Kind::all().find(is_family);
     let like = like.map_or(String::new(), |kind| format!(", most like {}", kind.family.words()));
-    format!("something{port} that no kind in the catalogue explains{like}{does}")
+    format!("something{port} that the catalogue lacks{like}{does}")
 }
 
 /// The text with a capital first letter.
@@ -309,19 +309,19 @@ mod tests {
         };
         assert_eq!(
             capital(&named(&absorber, &track())),
-            "At SN24, 3.00 m: something under the rail seat that no kind in the catalogue explains; it \
+            "At SN24, 3.00 m: something under the rail seat that the catalogue lacks; it \
              acts like a mass of 0.41 kg on a spring, at 900 Hz (unknown_physics, 99 %)."
         );
         let support = Hypothesis { family: Some("support".to_owned()), ..absorber.clone() };
         assert!(named(&support, &track()).contains(
-            "explains, most like a support of sleepers that is lost, soft or layered; it acts"
+            "lacks, most like a support of sleepers that is lost, soft or layered; it acts"
         ));
         let structure = Hypothesis { family: Some("unknown_structure".to_owned()), ..absorber };
-        assert!(named(&structure, &track()).contains("explains; it acts"));
+        assert!(named(&structure, &track()).contains("lacks; it acts"));
         let everywhere = Hypothesis { location: None, behaviour: None, ..structure };
         assert_eq!(
             named(&everywhere, &track()),
-            "at all sleepers: something under the rail seat that no kind in the catalogue explains \
+            "at all sleepers: something under the rail seat that the catalogue lacks \
              (unknown_physics, 99 %)."
         );
     }

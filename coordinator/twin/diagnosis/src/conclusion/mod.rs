@@ -251,15 +251,9 @@ fn add_wheel_mode(hypotheses: &mut Vec<Hypothesis>) {
     let is_box = |it: &&mut Hypothesis| it.accepted && it.physics == FLEXIBLE_AXLE_BOX.physics;
     let Some(axle_box) = hypotheses.iter_mut().find(is_box) else { return };
     let mode = Hypothesis {
-        physics: UNKNOWN.to_owned(),
         family: Some(EffectFamily::UnknownWheel.name().to_owned()),
-        probability: (1.0 - NAMED_SHARE) * axle_box.probability,
         accepted: false,
-        port: Some(PortPlace::Wheel.name().to_owned()),
-        parameters: BTreeMap::new(),
-        assumed: BTreeMap::new(),
-        look_alikes: vec![axle_box.physics.clone()],
-        ..axle_box.clone()
+        ..unknown_like(axle_box, &PortPlace::Wheel, 1.0 - NAMED_SHARE)
     };
     axle_box.probability *= NAMED_SHARE;
     hypotheses.push(mode);
@@ -275,18 +269,25 @@ fn add_resonator(hypotheses: &mut Vec<Hypothesis>, unknown_max: f64) {
     };
     let mut added = Vec::new();
     for layer in hypotheses.iter_mut().filter(|it| is_single(it)) {
-        added.push(Hypothesis {
-            physics: UNKNOWN.to_owned(),
-            probability: (NAMED_SHARE * layer.probability).min(unknown_max),
-            port: Some(PortPlace::Seats(Vec::new()).name().to_owned()),
-            parameters: BTreeMap::new(),
-            assumed: BTreeMap::new(),
-            look_alikes: vec![layer.physics.clone()],
-            ..layer.clone()
-        });
+        let mut unknown = unknown_like(layer, &PortPlace::Seats(Vec::new()), NAMED_SHARE);
+        unknown.probability = unknown.probability.min(unknown_max);
+        added.push(unknown);
         layer.probability *= 1.0 - NAMED_SHARE;
     }
     hypotheses.extend(added);
+}
+
+/// Unknown physics that acts as this hypothesis does, with a share of its probability.
+fn unknown_like(named: &Hypothesis, port: &PortPlace, share: f64) -> Hypothesis {
+    Hypothesis {
+        physics: UNKNOWN.to_owned(),
+        probability: share * named.probability,
+        port: Some(port.name().to_owned()),
+        parameters: BTreeMap::new(),
+        assumed: BTreeMap::new(),
+        look_alikes: vec![named.physics.clone()],
+        ..named.clone()
+    }
 }
 
 /// Sets the probability of each hypothesis's family at its location; its members exclude each other there.
