@@ -124,7 +124,8 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
 /// Prints one line per measure, and the path of the tables.
 fn print(summary: &Summary, folder: &Path) {
     for row in &summary.rows {
-        println_stdout(&format!("{}: {} ({})", row.measure, row.value, row.goal));
+        let goal = row.goal.as_ref().map_or(String::new(), |goal| format!(" ({goal})"));
+        println_stdout(&format!("{}: {}{goal}", row.measure, row.value));
     }
     println_stdout(&format!("tables: {}", folder.join("trial.md").display()));
 }

@@ -1,6 +1,7 @@
 //! Measures of a group of cases: rates with their intervals, compared with the goals.
 
 use crate::class::Class;
+use crate::paper::Usual;
 use crate::rate::{Rate, median};
 use crate::score::{CaseScore, KnockedOut, Named, Placed};
 use tracktwin_diagnosis::Verdict;
@@ -16,7 +17,8 @@ const BINS: usize = 10;
 pub(crate) struct Measured {
     pub(crate) measure: &'static str,
     pub(crate) value: String,
-    pub(crate) goal: String,
+    /// `None` if the measure is only reported.
+    pub(crate) goal: Option<String>,
     pub(crate) reached: Option<bool>,
     /// Size for comparisons; a larger value is worse. `None` if nothing was measured.
     pub(crate) badness: Option<f64>,
@@ -37,16 +39,75 @@ fn singles(scores: &[CaseScore]) -> impl Iterator<Item = (&CaseScore, &Named)> {
     of_class(scores, Class::Single).filter_map(|score| Some((score, score.hidden.first()?)))
 }
 
+/// Effects that were hidden alone, of the catalogue or not, with their scores.
+pub(crate) fn alone(scores: &[CaseScore]) -> impl Iterator<Item = (&CaseScore, &Named)> {
+    let one = |class| matches!(class, Class::Single | Class::Unknown);
+    let cases = scores.iter().filter(move |score| one(score.class));
+    cases.filter_map(|score| Some((score, score.hidden.first()?)))
+}
+
 /// All measures of the scores. `planned` is the number of cases; a case without a score is a failed
-/// diagnosis.
-pub(crate) fn measures(planned: usize, scores: &[CaseScore]) -> Vec<Measured> {
+/// diagnosis. `usual` has the errors that the method of the paper usually has on controls.
+pub(crate) fn measures(
+    planned: usize,
+    scores: &[CaseScore],
+    usual: Option<Usual>,
+) -> Vec<Measured> {
     let broken_down = Rate { hits: (planned - scores.len()) as u64, of: planned as u64 };
-    let mut all = alarms(scores);
+    let mut all = concealed(scores, usual);
+    all.extend(of_any_strength(scores));
+    all.extend(alarms(scores));
     all.extend(names(scores));
     all.extend(places(scores));
     all.extend([calibration(scores), bias(scores), cost(scores)]);
     all.push(at_most("diagnoses that broke down", broken_down, 0.0));
     all
+}
+
+/// What is said of effects that the method of the paper does not show.
+fn concealed(scores: &[CaseScore], usual: Option<Usual>) -> Vec<Measured> {
+    let shown_as_usual = |score: &CaseScore| {
+        usual.zip(score.paper.as_ref()).is_some_and(|(usual, paper)| usual.is_content(paper))
+    };
+    let concealed: Vec<_> = alone(scores).filter(|(score, _)| shown_as_usual(score)).collect();
+    let rate = |is_so: fn(&CaseScore, &Named) -> bool| {
+        Rate::of(concealed.iter().map(|(score, named)| is_so(score, named)))
+    };
+    let places = concealed.iter().filter_map(|(_, named)| named.place);
+    vec![
+        without_goal("concealed effects: detected", rate(|score, _| alarmed(score))),
+        without_goal("concealed effects: family first", rate(|_, named| named.family_first)),
+        without_goal(
+            "concealed effects with a place: placed within one sleeper",
+            Rate::of(places.map(Placed::within_a_sleeper)),
+        ),
+        without_goal(
+            "concealed effects, d' 6.5 and more: family first",
+            Rate::of(
+                concealed
+                    .iter()
+                    .filter(|(_, named)| named.detectability.is_some_and(|length| length >= SURE))
+                    .map(|(_, named)| named.family_first),
+            ),
+        ),
+    ]
+}
+
+/// What is said of all effects that were hidden alone, weak ones too.
+fn of_any_strength(scores: &[CaseScore]) -> Vec<Measured> {
+    let rate = |is_so: fn(&CaseScore, &Named) -> bool| {
+        Rate::of(alone(scores).map(|(score, named)| is_so(score, named)))
+    };
+    let places = alone(scores).filter_map(|(_, named)| named.place);
+    vec![
+        without_goal("effects of any strength: detected", rate(|score, _| alarmed(score))),
+        without_goal("effects of any strength: family first", rate(|_, named| named.family_first)),
+        without_goal("effects of any strength: member first", rate(|_, named| named.first)),
+        without_goal(
+            "effects of any strength with a place: placed within one sleeper",
+            Rate::of(places.map(Placed::within_a_sleeper)),
+        ),
+    ]
 }
 
 fn visible(scores: &[CaseScore], least: f64) -> impl Iterator<Item = (&CaseScore, &Named)> {
@@ -127,12 +188,17 @@ fn knocked_out(scores: &[CaseScore]) -> impl Iterator<Item = &KnockedOut> {
     scores.iter().filter_map(|score| score.knocked_out.as_ref())
 }
 
+/// A rate that is only reported.
+fn without_goal(measure: &'static str, rate: Rate) -> Measured {
+    Measured { goal: None, reached: None, ..at_least(measure, rate, 1.0) }
+}
+
 fn at_least(measure: &'static str, rate: Rate, goal: f64) -> Measured {
     let share = rate.share();
     Measured {
         measure,
         value: rate.to_text(),
-        goal: format!("{:.0} % or more", 100.0 * goal),
+        goal: Some(format!("{:.0} % or more", 100.0 * goal)),
         reached: share.map(|share| share >= goal),
         badness: share.map(|share| 1.0 - share),
         of: rate.of,
@@ -144,7 +210,7 @@ fn at_most(measure: &'static str, rate: Rate, goal: f64) -> Measured {
     Measured {
         measure,
         value: rate.to_text(),
-        goal: format!("{:.0} % at most", 100.0 * goal),
+        goal: Some(format!("{:.0} % at most", 100.0 * goal)),
         reached: share.map(|share| share <= goal),
         badness: share,
         of: rate.of,
@@ -160,7 +226,7 @@ fn calibration(scores: &[CaseScore]) -> Measured {
         measure: "expected calibration error of the probabilities",
         value: error
             .map_or("none".to_owned(), |error| format!("{error:.3} ({} given)", given.len())),
-        goal: "0.05 at most".to_owned(),
+        goal: Some("0.05 at most".to_owned()),
         reached: error.map(|error| error <= 0.05),
         badness: error,
         of: scores.len() as u64,
@@ -193,7 +259,7 @@ fn bias(scores: &[CaseScore]) -> Measured {
         } else {
             "none".to_owned()
         },
-        goal: "a third of the baseline's at most".to_owned(),
+        goal: Some("a third of the baseline's at most".to_owned()),
         reached: known.then_some(after <= before / 3.0),
         badness: known.then_some(after / before),
         of: biases.len() as u64,
@@ -210,7 +276,7 @@ fn cost(scores: &[CaseScore]) -> Measured {
     Measured {
         measure: "CPU time of a diagnosis",
         value,
-        goal: "5 minutes on two cores".to_owned(),
+        goal: Some("5 minutes on two cores".to_owned()),
         reached: most.map(|most| most <= 600.0),
         badness: most,
         of: scores.len() as u64,

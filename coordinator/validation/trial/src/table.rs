@@ -3,6 +3,7 @@
 use crate::making::Making;
 use crate::rate::Rate;
 use crate::score::CaseScore;
+use crate::strength::StrengthRow;
 use crate::summary::{KindRow, MeasureRow, Summary};
 use std::fmt::Write;
 
@@ -15,6 +16,11 @@ impl Summary {
         page.push_str(&"---|".repeat(self.makings.len() + 5));
         page.push('\n');
         self.rows.iter().for_each(|row| page.push_str(&measure(row)));
+        page.push_str(
+            "\n| d' of effects that were hidden alone | alarm | family first | member first \
+             |\n|---|---|---|---|\n",
+        );
+        self.strengths.iter().for_each(|row| page.push_str(&of_strength(row)));
         page.push_str(
             "\n| hidden | alarm | first name | placed within a sleeper | median d' | re-tuned \
              baseline looks well | paper's pipeline content |\n|---|---|---|---|---|---|---|\n",
@@ -33,20 +39,30 @@ fn measure(row: &MeasureRow) -> String {
     let reached = match reached {
         Some(true) => "reached",
         Some(false) => "**not reached**",
+        None if goal.is_none() => "-",
         None => "not measured",
     };
     let by_making: Vec<_> = by_making.values().map(String::as_str).collect();
     let by_making = by_making.join(" | ");
     let worst = worst.map_or("-", Making::name);
+    let goal = goal.as_deref().unwrap_or("-");
     format!("| {measure} | {value} | {by_making} | {worst} | {goal} | {reached} |\n")
 }
 
+fn count(rate: Rate) -> String {
+    format!("{} of {}", rate.hits, rate.of)
+}
+
+fn of_strength(row: &StrengthRow) -> String {
+    let [detected, family, first] = [row.detected, row.family_first, row.first].map(count);
+    format!("| {} | {detected} | {family} | {first} |\n", row.class())
+}
+
 fn of_kind(row: &KindRow) -> String {
-    let count = |rate: Rate| format!("{} of {}", rate.hits, rate.of);
     let length = row.detectability.map_or("-".to_owned(), |length| format!("{length:.1}"));
     let KindRow { physics, detected, first, placed, concealed, content, .. } = row;
     let [detected, first, placed, concealed, content] =
-        [detected, first, placed, concealed, content].map(|r| count(*r));
+        [*detected, *first, *placed, *concealed, *content].map(count);
     format!(
         "| `{physics}` | {detected} | {first} | {placed} | {length} | {concealed} | {content} |\n"
     )
