@@ -14,7 +14,7 @@ mod null;
 
 use crate::{Error, TrainingSet};
 use coordinates::Coordinates;
-use faer::{Mat, MatRef};
+use faer::{ColRef, Mat, MatRef};
 use fit::{BoundedFit, Bounds, Problem};
 use null::Null;
 use parking_lot::Mutex;
@@ -85,7 +85,7 @@ pub struct Domain {
     coordinates: Coordinates,
     null: Null,
     varied: Vec<Parameter>,
-    /// Coordinates of the entries, n x d.
+    /// Coordinates of the entries, d x n: those of an entry lie next to each other.
     entries: Mat<f64>,
     /// Mapped parameters of the entries, n x p.
     unit: Mat<f64>,
@@ -106,7 +106,7 @@ impl Domain {
         Ok(Self {
             null: Null::of(set, speeds)?,
             varied: set.varied.clone(),
-            entries: coordinates.apply(features.as_ref()),
+            entries: coordinates.apply(features.as_ref()).transpose().to_owned(),
             unit: coordinates.polynomial.unit(set.values(&all).as_ref()),
             coordinates,
             limits: Mutex::default(),
@@ -139,11 +139,12 @@ impl Domain {
     ) -> Result<Judgement, Error> {
         let limit = self.limit(windows, 0.5 * probability);
         let bounds = Bounds::library(self.varied.len());
-        let (problem, best) = self.inside(mean, windows, &bounds)?;
+        let apart = self.apart(mean);
+        let (problem, best) = self.inside(mean, windows, &bounds, &apart)?;
         let misfit = best.chi_square / limit;
         // Few tracks of a library lie at an end, so that ends share no probability.
         let needed = gain_needed(probability, windows);
-        let nowhere = (misfit > 1.0).then_some(mean);
+        let nowhere = (misfit > 1.0).then_some(apart.as_slice());
         let further = self.push(&problem, &bounds, &best, nowhere)?;
         // An end that leaves most of what is too much is no explanation.
         let left = limit + LEFT_MOST * (best.chi_square - limit).max(0.0);
@@ -167,12 +168,13 @@ impl Domain {
         mean: &[f64],
         windows: usize,
         bounds: &Bounds,
+        apart: &[f64],
     ) -> Result<(Problem<'_>, BoundedFit), Error> {
         let coefficients = self.coordinates.polynomial.coefficients();
-        let typical = coefficients as f64 / self.entries.nrows() as f64;
+        let typical = coefficients as f64 / self.entries.ncols() as f64;
         let problem = self.problem(mean, windows, typical);
         let mut best: Option<BoundedFit> = None;
-        for start in self.nearest(mean, STARTS, |_| true) {
+        for start in self.nearest(apart, STARTS, |_| true) {
             let fit = problem.solve(bounds, &start)?;
             if best.as_ref().is_none_or(|best| fit.chi_square < best.chi_square) {
                 best = Some(fit);
@@ -191,24 +193,27 @@ impl Domain {
         Problem::new(&self.coordinates, observed, &precision)
     }
 
-    /// Mapped parameters of the `count` entries whose coordinates are nearest to `observed`, among the
-    /// entries for which `counts` is true.
+    /// Squared distance of every entry from the observed coordinates, by what their differences vary.
+    fn apart(&self, observed: &[f64]) -> Vec<f64> {
+        let weight: Vec<f64> =
+            self.coordinates.discrepancy.iter().map(|between| 1.0 / (1.0 + between)).collect();
+        let to = |entry: ColRef<'_, f64>| -> f64 {
+            let terms = entry.iter().zip(observed).zip(&weight);
+            terms.map(|((a, b), weight)| weight * (a - b).powi(2)).sum()
+        };
+        self.entries.col_iter().map(to).collect()
+    }
+
+    /// Mapped parameters of the `count` entries that are nearest by their distances, among the entries for
+    /// which `counts` is true.
     fn nearest(
         &self,
-        observed: &[f64],
+        apart: &[f64],
         count: usize,
         counts: impl Fn(usize) -> bool,
     ) -> Vec<Vec<f64>> {
-        let weight: Vec<f64> =
-            self.coordinates.discrepancy.iter().map(|between| 1.0 / (1.0 + between)).collect();
-        let mut near: Vec<(f64, usize)> = (0..self.entries.nrows())
-            .filter(|&entry| counts(entry))
-            .map(|entry| {
-                let row = self.entries.row(entry);
-                let terms = row.iter().zip(observed).zip(&weight);
-                (terms.map(|((a, b), weight)| weight * (a - b).powi(2)).sum(), entry)
-            })
-            .collect();
+        let of = apart.iter().enumerate().filter(|(entry, _)| counts(*entry));
+        let mut near: Vec<(f64, usize)> = of.map(|(entry, &apart)| (apart, entry)).collect();
         if count < near.len() {
             near.select_nth_unstable_by(count, |a, b| a.0.total_cmp(&b.0));
             near.truncate(count);
@@ -218,7 +223,8 @@ impl Domain {
     }
 
     /// The end beyond which chi-square is smallest, with the fit there. The search covers the ends at which
-    /// the best fit lies, or all ends if `nowhere` holds coordinates that do not fit inside the library.
+    /// the best fit lies, or all ends if nothing inside the library fits; `nowhere` then holds the distances
+    /// of the entries.
     fn push(
         &self,
         problem: &Problem<'_>,
@@ -233,9 +239,9 @@ impl Domain {
                     continue;
                 }
                 let mut starts = vec![best.unit.clone()];
-                if let Some(observed) = nowhere {
+                if let Some(apart) = nowhere {
                     let near = |entry| towards(side, self.unit[(entry, axis)]) > NEAR_END;
-                    starts.extend(self.nearest(observed, 1, near));
+                    starts.extend(self.nearest(apart, 1, near));
                 }
                 for start in starts {
                     let (further, start) = beyond(bounds, &start, axis, side);
