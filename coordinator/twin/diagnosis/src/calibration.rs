@@ -156,7 +156,11 @@ impl Problem<'_> {
         Ok((0..sleepers).map(factor).collect())
     }
 
-    fn predict(&self, values: &DVector<f64>) -> Result<DVector<f64>, CalibrationError> {
+    /// Log powers that the model expects with these values.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] if no track or extension exists for the values.
+    pub(crate) fn predict(&self, values: &DVector<f64>) -> Result<DVector<f64>, CalibrationError> {
         Ok(self.forward.log_power(values, &self.extensions(values)?)?)
     }
 

@@ -58,6 +58,12 @@ impl Observation {
         self
     }
 
+    /// An observation of these log powers, with the same covariance.
+    #[must_use]
+    pub fn with_log_power(self, log_power: DVector<f64>) -> Self {
+        Self { log_power, ..self }
+    }
+
     /// Number of compared log powers per sleeper.
     pub const fn compared(&self) -> usize {
         self.compared

@@ -4,12 +4,15 @@ use crate::calibration::{CalibrationError, Problem};
 use crate::candidate::Candidate;
 use crate::observation::Observation;
 use crate::prepared_recording::PreparedRecording;
-use crate::screen::templates;
 use nalgebra::DVector;
 use tracktwin_track::extension::ExtensionInstance;
 
-/// Detectability `d'` of an extension in a recording: norm of its whitened signature after the baseline was
-/// fitted again.
+/// Detectability `d'` of an extension in a recording: norm of what remains of its whitened signature after the
+/// baseline was fitted again.
+///
+/// The baseline is fitted to the expected log powers with and without the extension, from the same start. Half
+/// the square of `d'` is the difference of the two smallest objectives. So a signature that other stiffnesses
+/// imitate counts little even if they are far away.
 ///
 /// `values` are the unknowns of the track without the extension. The indices of compared sleepers in
 /// `extension` begin at 0; its positions are those of the recording in m.
@@ -22,19 +25,21 @@ pub fn signature(
     values: &DVector<f64>,
     extension: ExtensionInstance,
 ) -> Result<f64, CalibrationError> {
-    let problem = Problem { forward: &prepared.forward, observation, candidates: &[] };
     let section = &prepared.forward.section;
-    // Screening leaves out what makes no track: here the reason is wanted.
-    section.in_model(&extension).build(&section.track.design, section.spans())?;
-    let (kind, trials) = (extension.kind()?, vec![Vec::new()]);
     let candidate = Candidate {
-        kind,
+        kind: extension.kind()?,
         extension,
         free: Vec::new(),
-        trials,
+        trials: vec![Vec::new()],
         length_ratio: section.track.design.length_ratio(),
     };
-    let traces = templates(&problem, &problem.at(values)?, &[candidate], &|| ())?;
-    let trace = traces.first().ok_or(CalibrationError::NotFinite)?;
-    Ok(trace.detectability.max(0.0).sqrt())
+    let problem = Problem { forward: &prepared.forward, observation, candidates: &[] };
+    let hidden = [candidate];
+    let left = |candidates: &[Candidate]| {
+        let expected = Problem { candidates, ..problem }.predict(values)?;
+        let observation = &observation.clone().with_log_power(expected);
+        let fitted = Problem { observation, ..problem }.calibrate_widely(values.clone())?;
+        Ok::<f64, CalibrationError>(fitted.objective)
+    };
+    Ok((2.0 * (left(&hidden)? - left(&[])?)).max(0.0).sqrt())
 }

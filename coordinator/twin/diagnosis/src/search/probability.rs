@@ -43,6 +43,13 @@ pub(crate) struct Probabilities {
     pub(crate) nothing: f64,
 }
 
+impl Probabilities {
+    /// Probability that something is left out which the recording shows.
+    pub(super) fn something(&self) -> f64 {
+        self.named.iter().sum::<f64>() + self.unknown
+    }
+}
+
 impl Round {
     /// Probabilities of the fitted candidates, of unknown physics and of nothing; the rest is that of
     /// effects too weak to detect.
@@ -164,6 +171,12 @@ mod tests {
         assert!(strong[1] > 0.25 && strong[1] < 0.5, "{strong:?}");
         let weak = of(&apart(&[100.0, 90.1]), None, 1.0, 0.0).named;
         assert!(weak[1] < 0.05, "{weak:?}");
+    }
+
+    #[test]
+    fn a_few_nats_leave_something_less_probable_than_nothing() {
+        let something = |evidence| of(&apart(&[evidence]), None, 1.0, 0.3).something();
+        assert!(something(9.0) < 0.5 && something(15.0) > 0.5);
     }
 
     #[test]

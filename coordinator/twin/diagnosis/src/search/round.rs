@@ -41,6 +41,9 @@ const ALONG_SHARE_MIN: f64 = 0.25;
 /// recordings of another simulator the gain was 58 for a true unknown and 5 for a false one.
 const UNKNOWN_HELD_OUT_MIN: f64 = 8.0;
 
+/// Probability of something visible being left out above which a candidate is accepted.
+const SOMETHING_MIN: f64 = 0.5;
+
 /// Data that all searches share.
 pub(super) struct Setting<'a> {
     pub(super) prepared: &'a PreparedRecording,
@@ -263,22 +266,24 @@ fn gain_at_least(least: f64, gains: &[f64]) -> bool {
     gains.is_empty() || (gains.iter().sum::<f64>() >= least && lost <= 1)
 }
 
-/// The best candidate, if it is more probable than the competing unknown physics and has enough evidence in
-/// addition to earlier extensions.
+/// The best candidate, if it is more probable than the competing unknown physics, has enough evidence in
+/// addition to earlier extensions, and something left out is more probable than nothing.
 pub(super) fn accepted_candidate<'r>(
     round: &'r Round,
     competitor: Option<&UnknownElement>,
     prepared: &PreparedRecording,
     threshold: EvidenceThreshold<'_>,
 ) -> Option<&'r Fitted> {
-    let Probabilities { group, unknown, .. } = round.against(competitor);
+    let probabilities = round.against(competitor);
+    let Probabilities { group, unknown, .. } = probabilities;
     let best = round.fitted.first()?;
     let is_shape = || {
         competitor
             .is_some_and(|competitor| is_shape_at(&competitor.place, &best.candidate, prepared))
     };
     let leads = group > unknown || is_shape();
-    (leads && best.log_evidence >= threshold.of(&best.candidate)).then_some(best)
+    let is_likely = probabilities.something() > SOMETHING_MIN;
+    (leads && is_likely && best.log_evidence >= threshold.of(&best.candidate)).then_some(best)
 }
 
 /// Whether a candidate is a shape of the rail that the inspection also detected, at the port of the unknown
