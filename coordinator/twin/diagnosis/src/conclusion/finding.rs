@@ -10,6 +10,12 @@ use tracktwin_track::extension::{Class, Kind, LookAlikeGroup, PlaceKind};
 /// Distance in sleeper spacings within which the signature of an accepted extension may resemble a finding.
 const REACH_SPANS: f64 = 3.0;
 
+/// Odds of an effect of a kind that an inspection finds, before the recording was seen.
+const ODDS_BEFORE: f64 = 0.1;
+
+/// Smallest p-value that is believed: the tails of the tests are not known further out.
+const P_MIN: f64 = 1e-6;
+
 /// Parameter of waves on the rail.
 const WAVELENGTH: &str = "wavelength_m";
 
@@ -130,13 +136,34 @@ pub(super) fn seen(finding: &Finding, kind: &Kind, location: Option<Location>) -
     }
 }
 
+/// Probability of a finding. The evidence of a p-value is at most `1 / (-e p ln p)` times that of chance (Sellke,
+/// Bayarri & Berger 2001, The American Statistician 55).
 pub(super) fn probability(finding: &Finding) -> f64 {
-    1.0 - finding.p_value.clamp(1e-6, 1.0)
+    let p_value = finding.p_value.clamp(P_MIN, (-1_f64).exp());
+    let odds = ODDS_BEFORE / (-std::f64::consts::E * p_value * p_value.ln());
+    odds / (1.0 + odds)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_finding_at_the_limit_of_its_test_is_likely_and_not_sure() {
+        let of = |p_value| {
+            probability(&Finding {
+                physics: "squat",
+                p_value,
+                place: tracktwin_inspection::Place::Everywhere,
+                parameters: BTreeMap::new(),
+                evidence: String::new(),
+            })
+        };
+        // 1 / (-e p ln p) is 29.6 at 0.002: odds of 2.96.
+        assert!((of(0.002) - 2.96 / 3.96).abs() < 1e-3, "{}", of(0.002));
+        assert!(of(1e-4) > 0.97 && of(1e-9) > 0.999);
+        assert!((of(0.9) - ODDS_BEFORE / (1.0 + ODDS_BEFORE)).abs() < 1e-12);
+    }
 
     #[test]
     fn of_two_wavelengths_the_better_known_one_is_stated() {
