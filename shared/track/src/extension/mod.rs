@@ -45,7 +45,8 @@ pub use kind::{Bound, Class, EffectFamily, Kind, KindParameter, LookAlikeGroup, 
 pub use measured::Measured;
 pub use registry::{
     CLIPPING, CORRUGATION, CRACKED_SLEEPER, ELECTRICAL_HUM, FLEXIBLE_AXLE_BOX, GAIN_ERROR,
-    POSITION_ERROR, RAIL_JOINT, SQUAT, SUBGRADE_LAYER, WHEEL_FLAT, WHEEL_OUT_OF_ROUND,
+    POSITION_ERROR, RAIL_JOINT, SENSOR_MOUNT_RESONANCE, SQUAT, SUBGRADE_LAYER, WHEEL_FLAT,
+    WHEEL_OUT_OF_ROUND,
 };
 pub use sampled::{SampledExtension, SampledValue};
 pub use screening::{Family, Places, Screening, Trials};

@@ -54,6 +54,8 @@ pub static CRACKED_SLEEPER: &Kind = &super::cracked_sleeper::KIND;
 pub static SUBGRADE_LAYER: &Kind = &super::subgrade_layer::KIND;
 /// Flexible axle box.
 pub static FLEXIBLE_AXLE_BOX: &Kind = &super::flexible_axle_box::KIND;
+/// Resonance of the sensor on its mounting.
+pub static SENSOR_MOUNT_RESONANCE: &Kind = &super::sensor_mount_resonance::KIND;
 /// Corrugation.
 pub static CORRUGATION: &Kind = &super::corrugation::KIND;
 /// Squat.

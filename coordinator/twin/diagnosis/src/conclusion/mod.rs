@@ -21,7 +21,7 @@ use tracktwin_inspection::Inspection;
 use tracktwin_inspection::chain::{LossOfContact, PassDefect};
 use tracktwin_signal::recording::Recording;
 use tracktwin_track::extension::{
-    EffectFamily, FLEXIBLE_AXLE_BOX, Kind, LookAlikeGroup, SUBGRADE_LAYER,
+    EffectFamily, FLEXIBLE_AXLE_BOX, Kind, LookAlikeGroup, SENSOR_MOUNT_RESONANCE, SUBGRADE_LAYER,
 };
 
 /// Largest probability if no held-out speed could be tested: at a single speed, structure and geometry have
@@ -245,17 +245,21 @@ fn add_siblings(hypotheses: &mut Vec<Hypothesis>, fitted: &[&str]) {
     hypotheses.extend(siblings);
 }
 
-/// Divides the probability of an accepted flexible axle box between it and a mode of the wheel's disc. Both
-/// are a mass that is held to the wheel by a spring, and the catalogue has no mode of the disc.
+/// Divides the probability of an accepted flexible axle box, or resonance of the sensor, between it and a mode of the
+/// wheel's disc. All are a mass on a spring between the contact and the sensor, and the catalogue has no mode of the
+/// disc. A name that already shares its probability with the other one keeps it.
 fn add_wheel_mode(hypotheses: &mut Vec<Hypothesis>) {
-    let is_box = |it: &&mut Hypothesis| it.accepted && it.physics == FLEXIBLE_AXLE_BOX.physics;
-    let Some(axle_box) = hypotheses.iter_mut().find(is_box) else { return };
+    let is_alike = |it: &&mut Hypothesis| {
+        let kinds = [FLEXIBLE_AXLE_BOX.physics, SENSOR_MOUNT_RESONANCE.physics];
+        it.accepted && it.probability > NAMED_SHARE && kinds.contains(&it.physics.as_str())
+    };
+    let Some(named) = hypotheses.iter_mut().find(is_alike) else { return };
     let mode = Hypothesis {
         family: Some(EffectFamily::UnknownWheel.name().to_owned()),
         accepted: false,
-        ..unknown_like(axle_box, &PortPlace::Wheel, 1.0 - NAMED_SHARE)
+        ..unknown_like(named, &PortPlace::Wheel, 1.0 - NAMED_SHARE)
     };
-    axle_box.probability *= NAMED_SHARE;
+    named.probability *= NAMED_SHARE;
     hypotheses.push(mode);
 }
 
@@ -340,6 +344,24 @@ mod tests {
         let sleepers = sleepers.iter().map(|id| (*id).to_owned()).collect();
         let place = Location { x_m: [1.0, 1.0], sleepers };
         Hypothesis { probability: 0.96, ..Hypothesis::accepted("subgrade_layer", Some(place)) }
+    }
+
+    #[test]
+    fn a_resonance_of_the_sensor_may_be_a_mode_of_the_wheel() {
+        let named = |probability| Hypothesis {
+            probability,
+            ..Hypothesis::accepted("sensor_mount_resonance", None)
+        };
+        let mut sure = vec![named(0.97)];
+        add_wheel_mode(&mut sure);
+        let [sensor, mode] = &sure[..] else { panic!("{sure:?}") };
+        assert!((sensor.probability - 0.6305).abs() < 1e-9 && sensor.accepted);
+        assert!((mode.probability - 0.3395).abs() < 1e-9 && !mode.accepted);
+        assert_eq!((mode.physics.as_str(), mode.port.as_deref()), (UNKNOWN, Some("wheel")));
+        // An axle box has its share already.
+        let mut shared = vec![named(0.57)];
+        add_wheel_mode(&mut shared);
+        assert_eq!(shared.len(), 1);
     }
 
     #[test]

@@ -16,6 +16,9 @@ const LOBE: f64 = 2.5;
 /// Default distance of the farthest neighbours of a line on either side, in resolution cells.
 const REACH: f64 = 18.0;
 
+/// Half width, in resolution cells, of the stretch over which the shape of a background is a line.
+const SHAPE: f64 = 18.0;
+
 /// Number of bins that count as one independent value in the mean of the neighbours.
 ///
 /// Padding, Hann window and the variance of a median give 6.2. The rule that the side with the higher power
@@ -112,6 +115,8 @@ pub(crate) struct Spectrum {
     length: usize,
     /// Distance of the farthest neighbours on either side, in resolution cells.
     reach: f64,
+    /// Expected power of each bin without lines, up to a factor.
+    shape: Option<Vec<f64>>,
 }
 
 impl Spectrum {
@@ -124,12 +129,23 @@ impl Spectrum {
         lines.resize(PADDING * length, Complex64::ZERO);
         FftPlanner::new().plan_fft_forward(lines.len()).process(&mut lines);
         let power = lines[..=length * PADDING / 2].iter().map(Complex64::norm_sqr).collect();
-        Self { step: 1.0 / (step * (PADDING * length) as f64), power, length, reach: REACH }
+        let step = 1.0 / (step * (PADDING * length) as f64);
+        Self { step, power, length, reach: REACH, shape: None }
     }
 
     /// The same spectrum, with neighbours up to `reach` resolution cells from a line.
     pub(crate) fn reaching(self, reach: f64) -> Self {
         Self { reach, ..self }
+    }
+
+    /// The same spectrum, whose expected power without lines has the shape of these spectra of equal bins.
+    pub(crate) fn like(self, others: &[Self]) -> Self {
+        let mean = |bin: usize| others.iter().map(|other| other.power[bin]).sum::<f64>();
+        let logarithms: Vec<f64> =
+            (0..self.len()).map(|bin| mean(bin).max(f64::MIN_POSITIVE).ln()).collect();
+        let half = (SHAPE * PADDING as f64) as usize;
+        let shape = (0..self.len()).map(|bin| local_line(&logarithms, bin, half).exp());
+        Self { shape: Some(shape.collect()), ..self }
     }
 
     /// Distance of the bins, in cycles per unit of `step`.
@@ -154,7 +170,7 @@ impl Spectrum {
     }
 
     /// Power of a bin relative to the median power of its neighbours, scaled to a mean of one without a
-    /// line.
+    /// line. Neighbours are scaled to the power that is expected in the bin.
     ///
     /// The side with the higher power counts, because on the flank of a resonance the other side is no
     /// background. Bins for which `skip` is true do not count. `None` if both sides have too few
@@ -163,10 +179,11 @@ impl Spectrum {
         let [near, far] = [LOBE, self.reach].map(|cells| (cells * PADDING as f64) as usize);
         let below = bin.saturating_sub(far).max(1)..bin.saturating_sub(near).max(1);
         let above = (bin + near + 1).min(self.len())..(bin + far + 1).min(self.len());
+        let expected = |other: usize| self.shape.as_ref().map_or(1.0, |it| it[bin] / it[other]);
         let side = |bins: Range<usize>| {
             let powers: Vec<f64> = bins
                 .filter(|&other| !skip(other as f64 * self.step))
-                .map(|i| self.power[i])
+                .map(|other| self.power[other] * expected(other))
                 .collect();
             (powers.len() >= (far - near) / 4).then(|| (powers.len(), median(powers)))
         };
@@ -177,6 +194,20 @@ impl Spectrum {
         let ratio = self.power[bin] / mean;
         (mean > 0.0).then_some(Line { ratio, neighbours, beside: mean })
     }
+}
+
+/// Value at `place` of the line fitted to the values at most `half` from it, near ones with more weight.
+fn local_line(values: &[f64], place: usize, half: usize) -> f64 {
+    let range = place.saturating_sub(half)..(place + half + 1).min(values.len());
+    let [mut w, mut wx, mut wxx, mut wy, mut wxy] = [0.0; 5];
+    for index in range {
+        let x = (index as f64 - place as f64) / (half + 1) as f64;
+        let (weight, y) = ((1.0 - x.abs().powi(3)).powi(3), values[index]);
+        (w, wx, wxx) = (w + weight, wx + weight * x, wxx + weight * x * x);
+        (wy, wxy) = (wy + weight * y, wxy + weight * x * y);
+    }
+    let determinant = w * wxx - wx * wx;
+    if determinant > 0.0 { (wxx * wy - wx * wxy) / determinant } else { wy / w }
 }
 
 /// Amplitude `a` of a tone from its power ratio. On a stretch of length `l`, in noise of one-sided density

@@ -196,8 +196,10 @@ impl OrderSearch<'_> {
         let speed = |group: Vec<usize>| {
             let values: Vec<Vec<Complex64>> = group.into_iter().map(values).collect();
             let passes: Vec<Spectrum> = values.iter().map(spectrum).collect();
-            let differences: Vec<Spectrum> =
-                values.windows(2).map(|pair| spectrum(&difference(&pair[0], &pair[1]))).collect();
+            // What passes differ by has the resonances of the passes.
+            let apart =
+                |pair: &[Vec<Complex64>]| spectrum(&difference(&pair[0], &pair[1])).like(&passes);
+            let differences: Vec<Spectrum> = values.windows(2).map(apart).collect();
             AtSpeed { passes, differences }
         };
         by_speed(passes).into_iter().map(speed).collect()
