@@ -9,12 +9,13 @@ use crate::pipeline::compute::compute;
 use crate::pipeline::coverage::{Counts, Coverage, CoverageRow, Kind, inversion_rows};
 use crate::pipeline::evaluate::Evaluator;
 use anyhow::{Context, anyhow};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use parking_lot::Mutex;
 use std::path::PathBuf;
 use tracktwin_library::Library;
 use tracktwin_parameters::Parameter;
 use tracktwin_surrogate::{Side, Trained};
+use tracktwin_trial::Making;
 
 /// Largest accepted share of tracks inside the ranges with a sleeper flagged as outside the
 /// library.
@@ -30,7 +31,7 @@ const FOUND_LEAST: f64 = 0.95;
         30 %) and tracks with one parameter 30 % beyond an end, evaluates them, and prints two \
         tables: the share flagged as outside the library, and the coverage of the 90 % intervals; \
         in brackets the coverage without the unevenness in the standard deviations.\n\nWith \
-            --method inversion: the reference simulator records tracks with an unevenness of 5, \
+            --method inversion: another simulator (--making) records tracks with an unevenness of 5, \
             15 and 30 %, two passes at each of three speeds; the table shows error and coverage \
             of railpad and ballast stiffness.\n\nExit codes: 0 done, 1 more than 2 % of the even \
             tracks inside are \
@@ -57,6 +58,10 @@ pub(super) struct Arguments {
     /// Seed of parameters and surfaces.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Simulator of the recordings (`inversion` only): `plain` is the reference simulator, `second` another
+    /// one with other elements, contact and nuisances.
+    #[arg(long, value_enum, default_value_t = Recorder::Plain)]
+    making: Recorder,
     /// Add a track with this value and all others in the middle of their ranges (`gp` only), e.g.
     /// `ballast_stiffness_N_m=6e7`; may be repeated.
     #[arg(long = "set", value_name = "NAME=VALUE")]
@@ -64,6 +69,22 @@ pub(super) struct Arguments {
     /// Print JSON.
     #[arg(long)]
     json: bool,
+}
+
+/// Simulator of the recordings.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Recorder {
+    Plain,
+    Second,
+}
+
+impl From<Recorder> for Making {
+    fn from(recorder: Recorder) -> Self {
+        match recorder {
+            Recorder::Plain => Self::Plain,
+            Recorder::Second => Self::Second,
+        }
+    }
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
@@ -99,7 +120,8 @@ async fn by_inversion(arguments: &Arguments) -> Result<(), Stop> {
     let total = 3 * u64::from(arguments.tracks);
     let bar = Mutex::new(Progress::begin("tracks", 0, total));
     let watch = |done, _| bar.lock().at(done, "");
-    let rows = inversion_rows(arguments.tracks, arguments.seed, library.as_ref(), &watch);
+    let Arguments { tracks, seed, making, .. } = *arguments;
+    let rows = inversion_rows(tracks, seed, making.into(), library.as_ref(), &watch);
     let rows = rows.await.context("cannot score the inversion")?;
     bar.into_inner().end();
     if arguments.json {

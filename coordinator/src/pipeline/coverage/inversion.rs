@@ -1,4 +1,4 @@
-//! Accuracy of the inversion on uneven tracks recorded by the reference simulator.
+//! Accuracy of the inversion on uneven tracks recorded by another simulator.
 
 use super::score::WIDTH_90;
 use crate::pipeline::compute::compute;
@@ -8,8 +8,9 @@ use std::collections::BTreeMap;
 use tracktwin_inversion::Inversion;
 use tracktwin_library::Library;
 use tracktwin_parameters::{Parameter, Preset};
-use tracktwin_reference_simulator::{Scene, SleeperTruth, TruthError, simulate};
+use tracktwin_reference_simulator::{Scene, SleeperTruth, TruthError};
 use tracktwin_ring::correlation;
+use tracktwin_trial::Making;
 
 /// Unevenness: standard deviation of the logarithm of a stiffness from sleeper to sleeper.
 const SCATTER: [f64; 3] = [0.05, 0.15, 0.3];
@@ -64,7 +65,7 @@ pub struct InversionScore {
     pub correlation: f64,
 }
 
-/// Simulates and evaluates `tracks` tracks for each unevenness. Progress is reported as number of completed
+/// Simulates and evaluates `tracks` tracks for each unevenness. The scenes of all makings are equal. Progress is reported as number of completed
 /// tracks and total number.
 ///
 /// # Errors
@@ -72,6 +73,7 @@ pub struct InversionScore {
 pub async fn inversion_rows(
     tracks: u32,
     seed: u64,
+    making: Making,
     library: Option<&Library>,
     progress: &(dyn Fn(u64, u64) + Sync),
 ) -> Result<Vec<InversionRow>, InversionCoverageError> {
@@ -82,7 +84,7 @@ pub async fn inversion_rows(
         let mut scores = Scores::default();
         for number in 0..tracks {
             let scene = Scene::uneven(seed.wrapping_mul(1000) + u64::from(number), scatter);
-            let mut recording = compute(|| simulate(&scene))?;
+            let mut recording = compute(|| making.simulate(&scene))?;
             recording.name = format!("track {number}");
             let track = Preset::VTrack.track();
             let inversion = invert(&recording, &track, None, library, &|_, _| ()).await?;

@@ -5,6 +5,7 @@ use crate::varied::{add_nuisances, assumptions, vary_track};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use tracktwin_reference_simulator::{Scene, TruthError};
+use tracktwin_signal::recording::Recording;
 
 /// Making of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -39,6 +40,17 @@ impl Making {
         match self {
             Self::Plain | Self::Varied => tracktwin_reference_simulator::record(scene, folder),
             Self::Second => tracktwin_second_simulator::record(scene, folder),
+        }
+    }
+
+    /// Simulates a scene, without files.
+    ///
+    /// # Errors
+    /// [`TruthError`] if the scene is invalid.
+    pub fn simulate(self, scene: &Scene) -> Result<Recording, TruthError> {
+        match self {
+            Self::Plain | Self::Varied => tracktwin_reference_simulator::simulate(scene),
+            Self::Second => tracktwin_second_simulator::simulate(scene),
         }
     }
 
