@@ -1,9 +1,11 @@
-//! Fig. 9: receptance peaks of the nominal track at its middle.
+//! Fig. 9: receptance peaks of the nominal track at its middle, and the receptances of a library's tracks.
 
 use crate::picture::{Picture, Scale, Style};
 use crate::speed::hertz;
 use crate::{ClaimVerdict, Compared, Error, Figure};
-use tracktwin_parameters::{Preset, TrackDesign};
+use rayon::prelude::*;
+use tracktwin_parameters::{ParameterSet, Preset, TrackDesign};
+use tracktwin_surrogate::TrainingSet;
 use tracktwin_track::frequency::{self, ReceptancePoint, peaks};
 use tracktwin_track::model::{Mesh, Support, TrackModel};
 
@@ -22,6 +24,28 @@ const PROMINENCE_DB: f64 = 3.0;
 /// Frequencies in Hz: step, first and last in steps, as fine as the narrowest peaks are wide.
 const STEP_HZ: f64 = 5.0;
 const STEPS: std::ops::Range<u32> = 10..1600;
+
+/// Steps between the frequencies of an envelope, whose edges are smooth.
+const ENVELOPE_STEPS: usize = 4;
+
+/// Largest number of tracks of an envelope.
+const ENVELOPE_TRACKS: usize = 60;
+
+/// Places of the hammer: name, and distance from a sleeper in spacings.
+const PLACES: [(&str, f64); 2] = [("sleeper", 0.0), ("midspan", 0.5)];
+
+/// Lowest and highest receptance of several tracks.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Envelope {
+    /// Number of tracks.
+    pub tracks: usize,
+    /// Where the tracks were struck and measured.
+    pub place: &'static str,
+    /// Frequencies in Hz.
+    pub frequencies_hz: Vec<f64>,
+    /// Lowest and highest magnitude of the point receptance in m/N.
+    pub limits: Vec<[f64; 2]>,
+}
 
 /// The receptance of a hammer test.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,19 +68,62 @@ pub(crate) fn hammer_tests(design: &TrackDesign) -> Result<Vec<HammerTest>, Erro
     let frequencies_hz: Vec<f64> = STEPS.map(|step| STEP_HZ * f64::from(step)).collect();
     let mut tests = Vec::new();
     for spans in [PAPER_SPANS, LONG_SPANS] {
-        let supports = vec![Support::from(&Preset::VTrack.nominal()); spans - 1];
-        let mesh = Mesh::uniform(spans, ELEMENTS, ELEMENTS);
-        let model = TrackModel::build(design, &mesh, &supports, &[])?;
-        for (place, offset) in [("sleeper", 0.0), ("midspan", 0.5)] {
-            let x_m = ((spans / 2) as f64 + offset) * design.sleeper.spacing_m;
-            let at = ReceptancePoint::Rail(x_m);
-            let values = frequency::receptance(&model, at, at, &frequencies_hz)?;
-            let magnitudes = values.iter().map(|value| value.norm()).collect();
+        let struck = struck(design, spans, &Preset::VTrack.nominal(), &frequencies_hz)?;
+        for ((place, _), magnitudes) in PLACES.into_iter().zip(struck) {
             let frequencies_hz = frequencies_hz.clone();
             tests.push(HammerTest { spans, place, frequencies_hz, magnitudes });
         }
     }
     Ok(tests)
+}
+
+/// Magnitudes of the point receptance in m/N at each of the [`PLACES`], at the middle of an even track.
+fn struck(
+    design: &TrackDesign,
+    spans: usize,
+    parameters: &ParameterSet,
+    frequencies_hz: &[f64],
+) -> Result<[Vec<f64>; 2], Error> {
+    let supports = vec![Support::from(parameters); spans - 1];
+    let mesh = Mesh::uniform(spans, ELEMENTS, ELEMENTS);
+    let model = TrackModel::build(design, &mesh, &supports, &[])?;
+    let mut magnitudes = [Vec::new(), Vec::new()];
+    for ((_, offset), magnitudes) in PLACES.into_iter().zip(&mut magnitudes) {
+        let x_m = ((spans / 2) as f64 + offset) * design.sleeper.spacing_m;
+        let at = ReceptancePoint::Rail(x_m);
+        let values = frequency::receptance(&model, at, at, frequencies_hz)?;
+        *magnitudes = values.iter().map(|value| value.norm()).collect();
+    }
+    Ok(magnitudes)
+}
+
+/// Envelopes over the first tracks of a library, one per place.
+///
+/// # Errors
+/// [`Error::Model`] or [`Error::Frequency`].
+pub(crate) fn envelopes(design: &TrackDesign, set: &TrainingSet) -> Result<Vec<Envelope>, Error> {
+    let steps = STEPS.step_by(ENVELOPE_STEPS);
+    let frequencies_hz: Vec<f64> = steps.map(|step| STEP_HZ * f64::from(step)).collect();
+    let tracks = set.entries().min(ENVELOPE_TRACKS);
+    let parameters = |entry: usize| {
+        let varied = set.varied.iter().zip(&set.parameters[entry * set.varied.len()..]);
+        varied.fold(Preset::VTrack.nominal(), |all, (&varied, &value)| all.with(varied, value))
+    };
+    let all: Vec<[Vec<f64>; 2]> = (0..tracks)
+        .into_par_iter()
+        .map(|entry| struck(design, PAPER_SPANS, &parameters(entry), &frequencies_hz))
+        .collect::<Result<_, _>>()?;
+    let envelope = |(index, (place, _)): (usize, (&'static str, f64))| {
+        let limits = |frequency: usize| {
+            let values = all.iter().map(|track| track[index][frequency]);
+            values.fold([f64::INFINITY, 0.0], |[low, high]: [f64; 2], value| {
+                [low.min(value), high.max(value)]
+            })
+        };
+        let limits = (0..frequencies_hz.len()).map(limits).collect();
+        Envelope { tracks, place, frequencies_hz: frequencies_hz.clone(), limits }
+    };
+    Ok(PLACES.into_iter().enumerate().map(envelope).collect())
 }
 
 impl HammerTest {
@@ -68,10 +135,14 @@ impl HammerTest {
 }
 
 /// Peaks of hammer tests beside the paper's Fig. 9.
-pub(crate) fn receptance(tests: &[HammerTest]) -> Compared {
-    let caption = "Point receptance of the rail at the middle of the nominal track, on the paper's \
-                   25 spans and on 200, where the ends are not heard.";
-    let mut compared = Compared::new(Figure::Fig9, caption);
+pub(crate) fn receptance(tests: &[HammerTest], envelopes: &[Envelope]) -> Compared {
+    let tracks = envelopes.first().map_or(0, |envelope| envelope.tracks);
+    let caption = format!(
+        "Point receptance of the rail at the middle of the nominal track, on the paper's 25 spans \
+         and on 200, where the ends have no effect. Thin lines: lowest and highest receptance of \
+         {tracks} tracks of the library, on 25 spans."
+    );
+    let mut compared = Compared::new(Figure::Fig9, &caption);
     let found = |spans: usize, [low, high]: [f64; 2]| -> Vec<f64> {
         let tests = tests.iter().filter(|test| test.spans == spans);
         let mut all: Vec<f64> =
@@ -109,7 +180,7 @@ pub(crate) fn receptance(tests: &[HammerTest]) -> Compared {
          near 1000 Hz are waves standing between the held ends (docs/accuracy.md)",
     );
     pinned(&mut compared, &found(PAPER_SPANS, rounded(6000.0)));
-    compared.pictures = ["sleeper", "midspan"].map(|place| picture(tests, place)).into();
+    compared.pictures = PLACES.map(|(place, _)| picture(tests, envelopes, place)).into();
     compared
 }
 
@@ -139,10 +210,17 @@ fn limits(paper_hz: f64) -> String {
     format!("{low} to {high} Hz, what {paper_hz} Hz with one digit may stand for")
 }
 
-fn picture(tests: &[HammerTest], place: &str) -> Picture {
+fn picture(tests: &[HammerTest], envelopes: &[Envelope], place: &str) -> Picture {
     let x = Scale::logarithmic("frequency in Hz");
     let mut picture = Picture::new(place, x, Scale::logarithmic("receptance in m/N"));
     picture.wide = true;
+    for envelope in envelopes.iter().filter(|envelope| envelope.place == place) {
+        for side in 0..2 {
+            let values = envelope.limits.iter().map(|limits| limits[side]);
+            let points = envelope.frequencies_hz.iter().copied().zip(values).collect();
+            picture = picture.with("", Style::Thin, points);
+        }
+    }
     for test in tests.iter().filter(|test| test.place == place) {
         let points = test.frequencies_hz.iter().copied().zip(test.magnitudes.iter().copied());
         picture = picture.with(format!("{} spans", test.spans), Style::Line, points.collect());
@@ -153,8 +231,9 @@ fn picture(tests: &[HammerTest], place: &str) -> Picture {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::verdicts;
+    use crate::testing::{library, verdicts};
     use ClaimVerdict::{CannotTell, Differs, Reproduced};
+    use tracktwin_parameters::Parameter;
 
     fn test(spans: usize, place: &'static str, peaks_hz: &[f64]) -> HammerTest {
         let frequencies_hz: Vec<f64> = STEPS.map(|step| STEP_HZ * f64::from(step)).collect();
@@ -173,9 +252,30 @@ mod tests {
             test(200, "sleeper", &[345.0]),
             test(200, "midspan", &[345.0]),
         ];
-        let compared = receptance(&tests);
+        let compared = receptance(&tests, &[]);
         assert_eq!(verdicts(&compared), [Reproduced, Reproduced, Reproduced, Differs, CannotTell]);
         assert_eq!(compared.rows[0].ours, "345 Hz");
+    }
+
+    #[test]
+    fn an_envelope_holds_the_tracks_that_it_is_made_of() {
+        let set = TrainingSet {
+            varied: vec![Parameter::RailpadStiffness],
+            parameters: vec![9e7, 2.5e8],
+            ..library(&[13.0], 2, |_, _, _| 0.0)
+        };
+        let design = TrackDesign::v_track();
+        let envelopes = envelopes(&design, &set).unwrap();
+        let [sleeper, midspan] = &envelopes[..] else { panic!("{}", envelopes.len()) };
+        assert_eq!((sleeper.place, midspan.place, sleeper.tracks), ("sleeper", "midspan", 2));
+        let soft = Preset::VTrack.nominal().with(Parameter::RailpadStiffness, 9e7);
+        let [soft, _] = struck(&design, PAPER_SPANS, &soft, &sleeper.frequencies_hz).unwrap();
+        let inside = |([low, high], value): (&[f64; 2], &f64)| low <= value && value <= high;
+        assert!(sleeper.limits.iter().zip(&soft).all(inside));
+        assert!(sleeper.limits.iter().any(|[low, high]| high > &(1.2 * low)));
+        let compared = receptance(&[], &envelopes);
+        assert!(compared.caption.contains("of 2 tracks"), "{}", compared.caption);
+        assert_eq!(compared.pictures[0].curves.len(), 2);
     }
 
     #[test]
@@ -186,7 +286,7 @@ mod tests {
 
     #[test]
     fn a_track_without_peaks_differs() {
-        let compared = receptance(&[test(25, "sleeper", &[400.0]), test(200, "sleeper", &[])]);
+        let compared = receptance(&[test(25, "sleeper", &[400.0]), test(200, "sleeper", &[])], &[]);
         assert_eq!(verdicts(&compared), [Differs, Differs, Differs, Differs, Reproduced]);
     }
 }

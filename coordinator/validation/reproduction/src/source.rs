@@ -11,7 +11,7 @@ use crate::irregularity_spectrum::irregularity_spectrum;
 use crate::local_change::local_change;
 use crate::local_spectra::local_spectra;
 use crate::one_parameter::{bending_stiffness, irregularity};
-use crate::receptance::{hammer_tests, receptance};
+use crate::receptance::{envelopes, hammer_tests, receptance};
 use crate::row::Compared;
 use crate::selector::selector;
 use crate::sensitivity::sensitivity;
@@ -63,9 +63,10 @@ impl Figure {
             Self::Fig2 => Source::Passes(time_frequency),
             Self::Fig3 => Source::Passes(local_spectra),
             Self::Fig8 => Source::Results(|of| irregularity_spectrum(of.experiment)),
-            Self::Fig9 => {
-                Source::Results(|of| Ok(receptance(&hammer_tests(&of.experiment.design)?)))
-            }
+            Self::Fig9 => Source::Results(|of| {
+                let design = &of.experiment.design;
+                Ok(receptance(&hammer_tests(design)?, &envelopes(design, of.set)?))
+            }),
             Self::Fig10 => {
                 Source::Results(|of| speed(of.set, of.experiment.features.wavelet_centre_rad))
             }

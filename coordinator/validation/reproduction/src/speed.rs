@@ -34,7 +34,8 @@ pub(crate) fn speed(set: &TrainingSet, centre_rad: f64) -> Result<Compared, Erro
     let cases: Vec<usize> = (0..set.entries()).collect();
     let spectra: Vec<Vec<Average>> =
         (0..set.speeds_km_h.len()).map(|speed| mean_spectrum(set, speed, &cases)).collect();
-    let caption = "Mean LWPS of all cases of the library, a curve a speed.";
+    let caption = "Mean LWPS of all cases of the library, one curve per speed. Thin lines: the middle \
+                   90 % of the cases at the highest speed.";
     let mut compared = Compared::new(figure, caption);
     magnitude(&mut compared, set);
     let found: Vec<Vec<f64>> =
@@ -129,11 +130,28 @@ fn picture(set: &TrainingSet, spectra: &[Vec<Average>]) -> Picture {
     let x = Scale::logarithmic("frequency in Hz");
     let mut picture = Picture::new("Mean LWPS by speed", x, Scale::linear("dB re 1 (m/s²)²"));
     picture.wide = true;
+    let fastest = set.speeds_km_h.len() - 1;
+    for (share, which) in [(0.05, "5 %"), (0.95, "95 %")] {
+        let points = set.frequencies_hz.iter().copied().zip(quantiles(set, fastest, share));
+        picture =
+            picture.with(format!("{which} of the cases below"), Style::Thin, points.collect());
+    }
     for (speed, spectrum) in set.speeds_km_h.iter().zip(spectra) {
         let points = points(&set.frequencies_hz, spectrum);
         picture = picture.with(format!("{speed} km/h"), Style::Line, points);
     }
     picture
+}
+
+/// Level in dB below which this share of the cases lies, a value a bin.
+fn quantiles(set: &TrainingSet, speed: usize, share: f64) -> Vec<f64> {
+    let of_bin = |bin: usize| {
+        let mut levels: Vec<f64> =
+            (0..set.entries()).map(|case| DB * log_power(set, speed, case)[bin]).collect();
+        levels.sort_by(f64::total_cmp);
+        levels[((levels.len() - 1) as f64 * share).round() as usize]
+    };
+    (0..set.frequencies_hz.len()).map(of_bin).collect()
 }
 
 /// Frequencies as a list.
@@ -167,6 +185,10 @@ mod tests {
         let compared = speed(&set(0.4, 1.0), 6.0).unwrap();
         assert_eq!(verdicts(&compared), [Reproduced; 3]);
         assert!(compared.rows[0].ours.contains("+1.7 dB"), "{}", compared.rows[0].ours);
+        let curves = &compared.pictures[0].curves;
+        let [low, high, .., mean] = &curves[..] else { panic!("{} curves", curves.len()) };
+        let between = low.points.iter().zip(&high.points).zip(&mean.points);
+        assert!(between.into_iter().all(|((low, high), mean)| low.1 < mean.1 && mean.1 < high.1));
     }
 
     #[test]

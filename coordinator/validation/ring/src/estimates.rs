@@ -16,6 +16,8 @@ struct SleeperEstimates {
     valid: bool,
     /// Mean and standard deviation.
     values: Estimates,
+    /// Mean absolute percentage error of the ten best matches (0.05 is 5 %). `None` without a selector.
+    mape: Option<f64>,
 }
 
 /// Estimates of one method from one set of passes, by the name of the sleeper.
@@ -51,9 +53,11 @@ impl Estimated {
         let read = |sleeper: &Value| {
             let flags = sleeper["flags"].as_array();
             let outside = flags.is_some_and(|of| of.iter().any(|it| it == "outside_library"));
-            let values = estimates(part(sleeper)?);
+            let part = part(sleeper)?;
             let id = sleeper["id"].as_str()?.to_owned();
-            Some((id, SleeperEstimates { valid: !outside, values }))
+            let errors = part["mape"].as_array().into_iter().flatten().filter_map(Value::as_f64);
+            let (values, mape) = (estimates(part), mean(errors));
+            Some((id, SleeperEstimates { valid: !outside, values, mape }))
         };
         Ok(Self { sleepers: sleepers.iter().filter_map(read).collect() })
     }
@@ -61,6 +65,11 @@ impl Estimated {
     /// The estimates of a sleeper.
     fn sleeper(&self, id: &str) -> Option<&SleeperEstimates> {
         self.sleepers.get(id)
+    }
+
+    /// Mean absolute percentage error of the ten best matches of a sleeper.
+    pub(crate) fn mape(&self, id: &str) -> Option<f64> {
+        self.sleeper(id)?.mape
     }
 
     /// The estimate of a parameter at a sleeper, valid or not.
@@ -138,7 +147,7 @@ mod tests {
         {"id": "SN1", "x_m": 0.0, "railpad_stiffness_N_m": {"mean": 8e7, "sd": 1e7}, "flags": []},
         {"id": "SN2", "x_m": 0.1, "railpad_stiffness_N_m": {"mean": 9e7, "sd": 1e7},
          "flags": ["outside_library"],
-         "selector": {"railpad_stiffness_N_m": {"mean": 7e7, "sd": 2e7}, "mape": [0.1]}}]}"#;
+         "selector": {"railpad_stiffness_N_m": {"mean": 7e7, "sd": 2e7}, "mape": [0.1, 0.3]}}]}"#;
 
     #[test]
     fn an_evaluation_is_read_with_what_is_not_valid() {
@@ -150,6 +159,7 @@ mod tests {
         assert_eq!(estimated.any("SN3", railpad), None);
         let selector = Estimated::read_selector(TEXT).unwrap().unwrap();
         assert_eq!(selector.any("SN2", railpad).unwrap().mean, 7e7);
+        assert_eq!((selector.mape("SN2"), estimated.mape("SN2")), (Some(0.2), None));
         assert!(Estimated::read("{}").is_err() && Estimated::read("[").is_err());
     }
 

@@ -1,4 +1,4 @@
-//! Pictures of the ring like the paper's Figs. 20, 21, 22 and 24.
+//! Pictures of the ring like the paper's Figs. 13a, 20, 21, 22 and 24.
 
 use crate::estimates::{WIDTH_90, mean};
 use crate::parameters::{ALONG, OWN};
@@ -28,6 +28,13 @@ pub(crate) fn pictures(study: &Study) -> Vec<(Vec<Picture>, &'static str)> {
         "Estimates from all passes with 90 % intervals, and the truth. Dashed vertical lines are \
          joints (paper, Fig. 20).",
     )];
+    if let Some(selector) = study.by(Method::Selector) {
+        all.push((
+            vec![mismatch(study, selector)],
+            "Mean absolute percentage error of the ten best matches in the library. Dashed vertical \
+             lines are joints (paper, Fig. 13a).",
+        ));
+    }
     if let Some(spectra) = &study.spectra {
         all.push((vec![rails(spectra)], "Mean over the sleepers of each rail (paper, Fig. 21)."));
     }
@@ -45,6 +52,19 @@ pub(crate) fn pictures(study: &Study) -> Vec<(Vec<Picture>, &'static str)> {
         ));
     }
     all
+}
+
+/// Errors of the best matches along the ring.
+fn mismatch(study: &Study, selector: &Estimated) -> Picture {
+    let sleepers = study.truth.sleepers.iter();
+    let error = |it: &SleeperTruth| Some((it.number as f64, 100.0 * selector.mape(&it.id)?));
+    let mut picture = frame(study, "Error of the model selector", "MAPE in %");
+    picture.curves.push(curve(
+        "ten best matches",
+        Style::Line,
+        sleepers.filter_map(error).collect(),
+    ));
+    picture
 }
 
 /// Divisor of the shown unit, and the unit.
@@ -210,11 +230,11 @@ mod tests {
         study.laps = vec![known.clone()];
         study.speeds = vec![(13.0, known)];
         let all = study.pictures();
-        assert_eq!(all.iter().map(|group| group.0.len()).collect::<Vec<_>>(), [5, 2, 3]);
+        assert_eq!(all.iter().map(|group| group.0.len()).collect::<Vec<_>>(), [5, 1, 2, 3]);
         let railpads = &all[0].0[1];
         assert_eq!(railpads.marks, [12.5, 37.5, 62.5, 87.5]);
         assert!(railpads.curves.iter().all(|curve| curve.points.len() == 100));
-        assert_eq!(all[1].0[1].marks.len(), 6);
+        assert_eq!(all[2].0[1].marks.len(), 6);
         assert_eq!(railpads.names.last().unwrap().1, "SN100");
     }
 
