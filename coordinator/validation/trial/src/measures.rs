@@ -54,7 +54,7 @@ pub(crate) fn measures(
     usual: Option<Usual>,
 ) -> Vec<Measured> {
     let broken_down = Rate { hits: (planned - scores.len()) as u64, of: planned as u64 };
-    let mut all = concealed(scores, usual);
+    let mut all = not_shown(scores, usual);
     all.extend(of_any_strength(scores));
     all.extend(alarms(scores));
     all.extend(names(scores));
@@ -65,26 +65,32 @@ pub(crate) fn measures(
 }
 
 /// What is said of effects that the method of the paper does not show.
-fn concealed(scores: &[CaseScore], usual: Option<Usual>) -> Vec<Measured> {
+fn not_shown(scores: &[CaseScore], usual: Option<Usual>) -> Vec<Measured> {
     let shown_as_usual = |score: &CaseScore| {
         usual.zip(score.paper.as_ref()).is_some_and(|(usual, paper)| usual.is_content(paper))
     };
-    let concealed: Vec<_> = alone(scores).filter(|(score, _)| shown_as_usual(score)).collect();
+    let hidden: Vec<_> = alone(scores).filter(|(score, _)| shown_as_usual(score)).collect();
     let rate = |is_so: fn(&CaseScore, &Named) -> bool| {
-        Rate::of(concealed.iter().map(|(score, named)| is_so(score, named)))
+        Rate::of(hidden.iter().map(|(score, named)| is_so(score, named)))
     };
-    let places = concealed.iter().filter_map(|(_, named)| named.place);
+    let places = hidden.iter().filter_map(|(_, named)| named.place);
     vec![
-        without_goal("concealed effects: detected", rate(|score, _| alarmed(score))),
-        without_goal("concealed effects: family first", rate(|_, named| named.family_first)),
         without_goal(
-            "concealed effects with a place: placed within one sleeper",
+            "not shown by the paper's pipeline: detected",
+            rate(|score, _| alarmed(score)),
+        ),
+        without_goal(
+            "not shown by the paper's pipeline: family first",
+            rate(|_, named| named.family_first),
+        ),
+        without_goal(
+            "not shown by the paper's pipeline, with a place: placed within one sleeper",
             Rate::of(places.map(Placed::within_a_sleeper)),
         ),
         without_goal(
-            "concealed effects, d' 6.5 and more: family first",
+            "not shown by the paper's pipeline, d' 6.5 and more: family first",
             Rate::of(
-                concealed
+                hidden
                     .iter()
                     .filter(|(_, named)| named.detectability.is_some_and(|length| length >= SURE))
                     .map(|(_, named)| named.family_first),

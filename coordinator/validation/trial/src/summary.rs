@@ -200,14 +200,14 @@ mod tests {
             CaseScore { paper, ..control(n, Verdict::Consistent) }
         };
         let mut scores: Vec<CaseScore> = (0..6).map(usual).collect();
-        // Three are concealed, two of them found; the fourth one is found and shown by the paper's method.
+        // Three look usual to it, two of them found; the fourth one is found and shown by the paper's method.
         scores.extend([single(6, 8.0, 0.1), single(7, 4.0, 0.1), single(8, 4.0, 0.09)]);
         scores.push(single(10, 20.0, 0.2));
         let summary = Summary::new(&makings(12), &scores);
-        assert!(summary.rows[0].measure.starts_with("concealed effects: detected"));
+        assert!(summary.rows[0].measure.starts_with("not shown by the paper's pipeline: detected"));
         assert!(summary.rows[0].value.starts_with("2 of 3:"), "{:?}", summary.rows[0]);
         assert_eq!(summary.rows[0].reached, None);
-        let strong = row(&summary, "concealed effects, d' 6.5 and more");
+        let strong = row(&summary, "not shown by the paper's pipeline, d' 6.5 and more");
         assert!(strong.value.starts_with("1 of 1:"), "{strong:?}");
         let all = row(&summary, "effects of any strength: member first");
         assert!(all.value.starts_with("3 of 4:"), "{all:?}");
@@ -217,8 +217,10 @@ mod tests {
         assert_eq!(detected, expected);
         let page = summary.to_markdown(&scores);
         assert!(page.contains("| 3 to 5 | 1 of 2 | 1 of 2 | 1 of 2 |"), "{page}");
-        // Without the method of the paper nothing is known to be concealed.
-        scores.iter_mut().for_each(|score| score.paper = None);
+        // Without the method of the paper nothing is known to look usual.
+        for score in &mut scores {
+            score.paper = None;
+        }
         assert_eq!(Summary::new(&makings(12), &scores).rows[0].value, "none");
     }
 

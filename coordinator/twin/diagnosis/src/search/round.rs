@@ -267,7 +267,8 @@ fn gain_at_least(least: f64, gains: &[f64]) -> bool {
 }
 
 /// The best candidate, if it is more probable than the competing unknown physics, has enough evidence in
-/// addition to earlier extensions, and something left out is more probable than nothing.
+/// addition to earlier extensions, and something left out is more probable than nothing. Of a shape that the
+/// passes alone show, something is known to be left out.
 pub(super) fn accepted_candidate<'r>(
     round: &'r Round,
     competitor: Option<&UnknownElement>,
@@ -282,7 +283,9 @@ pub(super) fn accepted_candidate<'r>(
             .is_some_and(|competitor| is_shape_at(&competitor.place, &best.candidate, prepared))
     };
     let leads = group > unknown || is_shape();
-    let is_likely = probabilities.something() > SOMETHING_MIN;
+    let (section, shapes_m) = (&prepared.forward.section, &prepared.detected_shapes_m);
+    let is_likely = probabilities.something() > SOMETHING_MIN
+        || is_detected(&best.candidate, section, shapes_m);
     (leads && is_likely && best.log_evidence >= threshold.of(&best.candidate)).then_some(best)
 }
 
