@@ -65,8 +65,8 @@ pub struct InversionScore {
     pub correlation: f64,
 }
 
-/// Simulates and evaluates `tracks` tracks for each unevenness. The scenes of all makings are equal. Progress is reported as number of completed
-/// tracks and total number.
+/// Simulates and evaluates `tracks` tracks for each unevenness. All makings record the same scenes. Progress is
+/// reported as number of completed tracks and total number.
 ///
 /// # Errors
 /// Returns the [`InversionCoverageError`] of the first track that fails.

@@ -131,10 +131,10 @@ fn picture(set: &TrainingSet, spectra: &[Vec<Average>]) -> Picture {
     let mut picture = Picture::new("Mean LWPS by speed", x, Scale::linear("dB re 1 (m/s²)²"));
     picture.wide = true;
     let fastest = set.speeds_km_h.len() - 1;
-    for (share, which) in [(0.05, "5 %"), (0.95, "95 %")] {
-        let points = set.frequencies_hz.iter().copied().zip(quantiles(set, fastest, share));
-        picture =
-            picture.with(format!("{which} of the cases below"), Style::Thin, points.collect());
+    for share in [0.05, 0.95] {
+        let levels = quantiles(set, fastest, share);
+        let points = set.frequencies_hz.iter().copied().zip(levels).collect();
+        picture = picture.with("", Style::Thin, points);
     }
     for (speed, spectrum) in set.speeds_km_h.iter().zip(spectra) {
         let points = points(&set.frequencies_hz, spectrum);

@@ -37,10 +37,7 @@ impl Making {
     /// # Errors
     /// [`TruthError`] if the scene is invalid or the folder cannot be written.
     pub fn record(self, scene: &Scene, folder: &Path) -> Result<(), TruthError> {
-        match self {
-            Self::Plain | Self::Varied => tracktwin_reference_simulator::record(scene, folder),
-            Self::Second => tracktwin_second_simulator::record(scene, folder),
-        }
+        Ok(self.simulate(scene)?.write(folder)?)
     }
 
     /// Simulates a scene, without files.

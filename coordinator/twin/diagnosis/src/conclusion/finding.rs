@@ -136,10 +136,15 @@ pub(super) fn seen(finding: &Finding, kind: &Kind, location: Option<Location>) -
     }
 }
 
-/// Probability of a finding. The evidence of a p-value is at most `1 / (-e p ln p)` times that of chance (Sellke,
-/// Bayarri & Berger 2001, The American Statistician 55).
+/// Probability of a finding.
 pub(super) fn probability(finding: &Finding) -> f64 {
-    let p_value = finding.p_value.clamp(P_MIN, (-1_f64).exp());
+    probability_of(finding.p_value)
+}
+
+/// Probability of what a test found. The evidence of a p-value is at most `1 / (-e p ln p)` times that of chance
+/// (Sellke, Bayarri & Berger 2001, The American Statistician 55).
+pub(super) fn probability_of(p_value: f64) -> f64 {
+    let p_value = p_value.clamp(P_MIN, (-1_f64).exp());
     let odds = ODDS_BEFORE / (-std::f64::consts::E * p_value * p_value.ln());
     odds / (1.0 + odds)
 }
@@ -150,19 +155,10 @@ mod tests {
 
     #[test]
     fn a_finding_at_the_limit_of_its_test_is_likely_and_not_sure() {
-        let of = |p_value| {
-            probability(&Finding {
-                physics: "squat",
-                p_value,
-                place: tracktwin_inspection::Place::Everywhere,
-                parameters: BTreeMap::new(),
-                evidence: String::new(),
-            })
-        };
         // 1 / (-e p ln p) is 29.6 at 0.002: odds of 2.96.
-        assert!((of(0.002) - 2.96 / 3.96).abs() < 1e-3, "{}", of(0.002));
-        assert!(of(1e-4) > 0.97 && of(1e-9) > 0.999);
-        assert!((of(0.9) - ODDS_BEFORE / (1.0 + ODDS_BEFORE)).abs() < 1e-12);
+        assert!((probability_of(0.002) - 2.96 / 3.96).abs() < 1e-3, "{}", probability_of(0.002));
+        assert!(probability_of(1e-4) > 0.97 && probability_of(1e-9) > 0.999);
+        assert!((probability_of(0.9) - ODDS_BEFORE / (1.0 + ODDS_BEFORE)).abs() < 1e-12);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Findings of an inspection whose kind is not in the catalogue.
 
-use super::finding::seen;
+use super::finding::{probability_of, seen};
 use super::{Evidence, FAILED_SHARE};
 use crate::estimate::Estimate;
 use crate::outcome::{Hypothesis, UNKNOWN, meet};
@@ -82,8 +82,8 @@ impl Evidence<'_> {
         all.push(Hypothesis {
             physics: UNKNOWN.to_owned(),
             family: Some(family.name().to_owned()),
-            family_probability: 1.0 - p_value,
-            probability: 1.0 - p_value,
+            family_probability: probability_of(*p_value),
+            probability: probability_of(*p_value),
             accepted: true,
             location: Some(self.location(&sleepers)),
             port: Some(port.to_owned()),
