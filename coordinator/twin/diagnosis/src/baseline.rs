@@ -7,6 +7,7 @@
 
 use crate::quantity::{Common, Own, Quantity};
 use crate::section::Section;
+use crate::variation::{Exception, SupportChange, Variation};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use std::ops::Range;
 use tracktwin_parameters::{Parameter, Prior};
@@ -27,6 +28,8 @@ pub struct Unknowns {
     pub variation: [Variation; 3],
     /// Sleepers that differ from their neighbours by more than `variation`.
     pub exceptions: Vec<Exception>,
+    /// Changes of the ballast stiffness along the track in addition to `variation`.
+    pub support_changes: Vec<SupportChange>,
     /// Mean of each quantity of [`Common`].
     common: [Mean; 3],
     /// Standard deviation of the exponent of the surface's spectrum.
@@ -50,26 +53,6 @@ impl Mean {
     }
 }
 
-/// Variation of the logarithm of a quantity along the track, about its mean.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Variation {
-    /// Standard deviation of the smooth part.
-    pub smooth: f64,
-    /// Length of the smooth part's Gaussian correlation, in sleepers.
-    pub length: f64,
-    /// Standard deviation of the part that is independent from sleeper to sleeper.
-    pub independent: f64,
-}
-
-/// A sleeper at which one quantity is far from that of its neighbours.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Exception {
-    /// The quantity.
-    pub field: Own,
-    /// Index of the sleeper among the compared ones.
-    pub sleeper: usize,
-}
-
 /// Distance of knots in the logarithm of the wave number or of the frequency.
 const KNOT_DISTANCE: f64 = 0.35;
 
@@ -83,6 +66,8 @@ mod prior {
     ];
     /// Standard deviation of an exception from its neighbours.
     pub(super) const EXCEPTION: f64 = 1.0;
+    /// Standard deviation of a change of the ballast stiffness: a factor of two in either direction.
+    pub(super) const SUPPORT_CHANGE: f64 = std::f64::consts::LN_2;
     /// Deviation of the surface spectrum from eq. B.6, and its correlation length in `ln kappa`.
     pub(super) const SPECTRUM: f64 = 0.5;
     pub(super) const SPECTRUM_LENGTH: f64 = 0.7;
@@ -135,6 +120,7 @@ impl Unknowns {
             slope_deviation: known.slope_deviation,
             variation: prior::VARIATION,
             exceptions: Vec::new(),
+            support_changes: Vec::new(),
             response_deviation: if section.is_v_track() {
                 prior::RESPONSE
             } else {
@@ -262,14 +248,27 @@ impl Unknowns {
         typical
     }
 
-    /// Prior standard deviation of each unknown, without exceptions.
+    /// Prior standard deviation of each unknown, without exceptions and support changes.
     pub fn prior_deviations(&self) -> DVector<f64> {
         self.covariance().diagonal().map(f64::sqrt)
     }
 
-    /// Inverse of the prior covariance, with exceptions.
+    /// A change of the ballast stiffness in all unknowns; its amplitude has a standard deviation of one.
+    pub fn direction(&self, change: SupportChange) -> DVector<f64> {
+        let mut direction = DVector::zeros(self.count());
+        for (sleeper, index) in self.ballast().enumerate() {
+            direction[index] = prior::SUPPORT_CHANGE * change.share(sleeper);
+        }
+        direction
+    }
+
+    /// Inverse of the prior covariance, with exceptions and support changes.
     pub fn precision(&self) -> DMatrix<f64> {
         let mut covariance = self.covariance();
+        for &change in &self.support_changes {
+            let direction = self.direction(change);
+            covariance.ger(1.0, &direction, &direction, 1.0);
+        }
         for &Exception { field, sleeper } in &self.exceptions {
             let index = self.at(field, sleeper);
             covariance[(index, index)] += prior::EXCEPTION.powi(2);
@@ -277,7 +276,7 @@ impl Unknowns {
         Cholesky::new(covariance).expect("a prior with a white part is positive definite").inverse()
     }
 
-    /// Prior covariance of all unknowns, without exceptions.
+    /// Prior covariance of all unknowns, without exceptions and support changes.
     fn covariance(&self) -> DMatrix<f64> {
         let mut covariance = DMatrix::zeros(self.count(), self.count());
         for field in Own::ALL {

@@ -34,9 +34,10 @@ mod signature;
 mod spectra;
 mod suggestion;
 mod transfer;
+mod variation;
 
 pub use bands::Bands;
-pub use baseline::{Exception, Mean, Unknowns, Variation};
+pub use baseline::{Mean, Unknowns};
 pub use behaviour::{Behaviour, Element};
 pub use calibration::{Calibration, CalibrationError, Minimum, Problem};
 pub use candidate::{Candidate, candidates};
@@ -61,3 +62,4 @@ pub use search::{Fitted, Round, SearchOutcome, Stage, first_calibration, search}
 pub use section::Section;
 pub use signature::signature;
 pub use spectra::{Spectra, SpeedSpectra, are_one_speed};
+pub use variation::{Exception, SupportChange, Variation};

@@ -2,6 +2,7 @@
 
 use crate::fit::Fitted;
 use crate::record::{Along, Inversion, Prior, Provenance, Sleeper, log_normal};
+use crate::support_changes::changes;
 use std::collections::BTreeMap;
 use tracktwin_diagnosis::{Common, Own, PreparedRecording, Unknowns};
 use tracktwin_evaluation::{Estimates, Flag, Unevaluated};
@@ -43,7 +44,8 @@ impl Inversion {
             let index = number - prepared.first_sleeper;
             sleepers.push(fitted.sleeper(index, &place.id, place.x_m, resolved));
         }
-        Self::new(recording.name.clone(), provenance(sections), sleepers, unevaluated)
+        let changes = changes(recording, sections);
+        Self::new(recording.name.clone(), provenance(sections), sleepers, unevaluated, changes)
     }
 }
 

@@ -1,10 +1,11 @@
 //! The fit of one section of track.
 
-use crate::variation::{Quadratic, learn};
+use crate::quadratic::Quadratic;
+use crate::variation::learn;
 use nalgebra::{DMatrix, DVector};
 use tracktwin_diagnosis::{
     Calibration, CalibrationError, Candidate, Forward, Mean, NullModel, Observation, Own,
-    PreparationError, PreparedRecording, Problem, Unknowns, Variation,
+    PreparationError, PreparedRecording, Problem, SupportChange, Unknowns, Variation,
 };
 use tracktwin_parameters::Track;
 use tracktwin_signal::recording::Recording;
@@ -54,9 +55,23 @@ pub struct Fitted {
     pub values: DVector<f64>,
     /// Standard deviations of these logarithms.
     pub deviations: DVector<f64>,
+    /// Amplitude of each support change of `unknowns`, in their order.
+    pub changes: Vec<Amplitude>,
     /// Misfit of every sleeper: sum of squares of its whitened residual, divided by the number of its log
     /// powers; one on average if the model is valid.
     pub misfit: Vec<f64>,
+}
+
+/// Change of the logarithm of the ballast stiffness by a support change: a transition's stiffness behind it minus
+/// before it, a spot's stiffness minus that on both sides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Amplitude {
+    /// Posterior mean.
+    pub log: f64,
+    /// Posterior standard deviation.
+    pub deviation: f64,
+    /// Probability that there is a change and not only variation between sleepers.
+    pub probability: f64,
 }
 
 /// Splits a recording into sections that are fitted one by one.
@@ -96,6 +111,7 @@ pub fn fit(
     let problem = Problem { forward: &forward, observation: &plain, candidates: known };
     let mut calibration = problem.calibrate_widely(start)?;
     let inexact = problem.inexactness(&calibration.values)?;
+    let mut probabilities = Vec::new();
     for _ in 0..ROUNDS {
         let found = misfit(&calibration, &factors, plain.compared());
         let found = found.into_iter().map(factor);
@@ -103,7 +119,7 @@ pub fn fit(
         calibration = fit(&forward, &factors, calibration.values)?;
         let data = Quadratic::new(&calibration, forward.unknowns.typical(), known)
             .ok_or(CalibrationError::NotFinite)?;
-        learn(&mut forward.unknowns, &data);
+        probabilities = learn(&mut forward.unknowns, &data);
         let best = data.best(&forward.unknowns).ok_or(CalibrationError::NotFinite)?;
         let mut start = calibration.values;
         start.rows_mut(0, best.len()).copy_from(&best);
@@ -113,7 +129,7 @@ pub fn fit(
         along_valley(|forward, start| fit(forward, &factors, start), &forward, &calibration)?;
     let posterior = Posterior::mixture(&valley);
     let misfit = misfit(&calibration, &factors, plain.compared());
-    Ok(Fitted::of(forward.unknowns, posterior, misfit))
+    Ok(Fitted::of(forward.unknowns, posterior, &probabilities, misfit))
 }
 
 /// The unknowns of a fit, before the variation along the track is estimated.
@@ -218,7 +234,12 @@ fn factor(misfit: f64) -> f64 {
 }
 
 impl Fitted {
-    fn of(unknowns: Unknowns, posterior: Posterior, misfit: Vec<f64>) -> Self {
+    fn of(
+        unknowns: Unknowns,
+        posterior: Posterior,
+        probabilities: &[f64],
+        misfit: Vec<f64>,
+    ) -> Self {
         let Posterior { mut values, covariance } = posterior;
         let mut deviations = covariance.diagonal();
         // The spectrum's mean and the level are one quantity: the surface's power.
@@ -232,16 +253,30 @@ impl Fitted {
             deviations[index] += own + 2.0 * share * knots.column(index).sum();
         }
         let fields = [unknowns.ballast(), unknowns.railpad()];
-        for ((range, share), Variation { smooth, independent, .. }) in
-            fields.into_iter().zip(MISPLACED).zip(unknowns.variation)
-        {
-            let misplaced = (share * smooth.hypot(independent)).powi(2);
-            range.for_each(|index| deviations[index] += misplaced);
+        let misplaced = fields.into_iter().zip(MISPLACED).zip(unknowns.variation).map(
+            |((range, share), Variation { smooth, independent, .. })| {
+                (range, (share * smooth.hypot(independent)).powi(2))
+            },
+        );
+        let misplaced: Vec<_> = misplaced.collect();
+        let amplitude = |(&change, &probability): (&SupportChange, &f64)| {
+            let contrast = change.contrast(unknowns.ballast().len());
+            let range = unknowns.ballast();
+            let of = values.rows(range.start, range.len());
+            let within = covariance.view((range.start, range.start), (range.len(), range.len()));
+            let variance =
+                contrast.dot(&(within * &contrast)) + misplaced[0].1 * contrast.norm_squared();
+            Amplitude { log: contrast.dot(&of), deviation: variance.sqrt(), probability }
+        };
+        let changes = unknowns.support_changes.iter().zip(probabilities).map(amplitude).collect();
+        for (range, variance) in misplaced {
+            range.for_each(|index| deviations[index] += variance);
         }
         unknowns.global().for_each(|index| deviations[index] += COMMON_ERROR.powi(2));
         // What follows the unknowns are parameters of known physics.
         let count = unknowns.count();
         let deviations = deviations.rows(0, count).map(f64::sqrt);
-        Self { values: values.rows(0, count).into_owned(), unknowns, deviations, misfit }
+        let values = values.rows(0, count).into_owned();
+        Self { unknowns, values, deviations, changes, misfit }
     }
 }

@@ -1,5 +1,6 @@
 //! Record of an inversion, from which files and pages are made.
 
+use crate::support_changes::Change;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use tracktwin_diagnosis::Variation;
@@ -32,6 +33,8 @@ pub struct Inversion {
     pub sleepers: Vec<Sleeper>,
     /// Sleepers without estimates: not every pass covers their window with a margin.
     pub unevaluated: Vec<Unevaluated>,
+    /// Transitions and soft or stiff spots of the support, along the track.
+    pub support_changes: Vec<Change>,
     /// Part of the recording that the track model does not explain.
     pub outside_library: Unexplained,
     /// Notes on the result, one sentence each.
@@ -131,6 +134,7 @@ impl Inversion {
         provenance: Provenance,
         sleepers: Vec<Sleeper>,
         unevaluated: Vec<Unevaluated>,
+        support_changes: Vec<Change>,
     ) -> Self {
         let invalid = sleepers.iter().filter(|sleeper| !sleeper.is_valid()).count();
         let share = invalid as f64 / sleepers.len().max(1) as f64;
@@ -141,6 +145,7 @@ impl Inversion {
             provenance,
             sleepers,
             unevaluated,
+            support_changes,
             outside_library: Unexplained { share, widen: Vec::new() },
             notes: Vec::new(),
         };
@@ -148,8 +153,8 @@ impl Inversion {
         inversion
     }
 
-    /// Sentences on sleepers that the track model does not explain, that differ from their neighbours, or
-    /// whose railpad stiffness is a lower bound.
+    /// Sentences on sleepers that the track model does not explain, on support changes, on sleepers that differ from
+    /// their neighbours, and on those whose railpad stiffness is a lower bound.
     pub fn sentences(&self) -> Vec<String> {
         let unexplained = self.with(Flag::OutsideLibrary);
         let apart = self.with(Flag::UnlikeNeighbours);
@@ -163,6 +168,7 @@ impl Inversion {
                 listed(&unexplained)
             ));
         }
+        sentences.extend(self.support_changes.iter().map(Change::sentence));
         if !apart.is_empty() {
             sentences.push(format!(
                 "{} differ{} from the neighbouring sleepers by more than the track varies elsewhere.",

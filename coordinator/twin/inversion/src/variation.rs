@@ -1,10 +1,8 @@
-//! Variation between the sleepers of a recording: the prior's variation that maximises the evidence.
-//!
-//! Near a fitted track the log likelihood of the data is quadratic in the unknowns. The evidence of any
-//! Gaussian prior then has a closed form (Laplace), and no forward model is needed to compare two priors.
+//! Variation between the sleepers of a recording: the prior's variation, support changes and exceptions that
+//! maximise the evidence.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
-use tracktwin_diagnosis::{Calibration, Candidate, Exception, Own, Unknowns, Variation};
+use crate::quadratic::Quadratic;
+use tracktwin_diagnosis::{Exception, Own, SupportChange, Unknowns, Variation};
 
 /// Factors on a deviation or a length that the search tries.
 const FACTORS: [f64; 4] = [0.5, 0.75, 1.35, 2.0];
@@ -30,69 +28,18 @@ const EXCEPTION_NATS: f64 = 5.0;
 /// Largest number of exceptions in one quantity, as a share of all sleepers.
 const EXCEPTIONS_MAX: f64 = 0.2;
 
-/// Quadratic log likelihood near a fitted track, integrated over the parameters of known physics:
-/// `-0.5 x' H x + b' x` plus a constant.
-pub(super) struct Quadratic {
-    information: DMatrix<f64>,
-    slope: DVector<f64>,
-    mean: DVector<f64>,
-}
+/// Prior odds of a support change in a section.
+const CHANGE_ODDS: f64 = 1.0;
 
-impl Quadratic {
-    /// Makes it from the whitened residual and derivatives of a fit with `known` physics; `x` is the distance
-    /// from the prior's mean. `None` if a number is not finite.
-    pub(super) fn new(
-        calibration: &Calibration,
-        mean: DVector<f64>,
-        known: &[Candidate],
-    ) -> Option<Self> {
-        let jacobian = &calibration.jacobian;
-        let priors = |candidate: &Candidate| -> Vec<(f64, f64)> {
-            candidate.free.iter().map(|parameter| candidate.prior(parameter)).collect()
-        };
-        let priors: Vec<(f64, f64)> = known.iter().flat_map(priors).collect();
-        let (count, further) = (mean.len(), priors.len());
-        let means = priors.iter().map(|(mean, _)| *mean);
-        let all = DVector::from_iterator(count + further, mean.iter().copied().chain(means));
-        let at_mean = &calibration.residual + jacobian * (&calibration.values - all);
-        let information = jacobian.transpose() * jacobian;
-        let slope = jacobian.tr_mul(&at_mean);
-        if further == 0 {
-            return Some(Self { information, slope, mean });
-        }
-        // A Gaussian integral over the last parameters with their prior: the Schur complement.
-        let mut own = information.view((count, count), (further, further)).into_owned();
-        for (index, (_, deviation)) in priors.iter().enumerate() {
-            own[(index, index)] += deviation.powi(-2);
-        }
-        let own = Cholesky::new(own)?;
-        let both = information.view((0, count), (count, further)).into_owned();
-        let rest = slope.rows(count, further).into_owned();
-        Some(Self {
-            information: information.view((0, 0), (count, count))
-                - &both * own.solve(&both.transpose()),
-            slope: slope.rows(0, count) - both * own.solve(&rest),
-            mean,
-        })
-    }
+/// Nothing is more probable than this, because the models of the variation are not exact.
+const PROBABILITY_MAX: f64 = 0.97;
 
-    /// Log evidence of a prior in nats, up to a constant of the data.
-    fn log_evidence(&self, unknowns: &Unknowns) -> f64 {
-        let precision = unknowns.precision();
-        let Some(prior) = Cholesky::new(precision.clone()) else { return f64::NEG_INFINITY };
-        let Some(posterior) = Cholesky::new(precision + &self.information) else {
-            return f64::NEG_INFINITY;
-        };
-        let gain = 0.5 * self.slope.dot(&posterior.solve(&self.slope));
-        gain + 0.5 * (prior.ln_determinant() - posterior.ln_determinant())
-            + unknowns.variation.iter().map(log_prior).sum::<f64>()
-    }
+/// Largest number of support changes in a section.
+const CHANGES_MAX: usize = 4;
 
-    /// The values of greatest posterior probability under a prior.
-    pub(super) fn best(&self, unknowns: &Unknowns) -> Option<DVector<f64>> {
-        let posterior = Cholesky::new(unknowns.precision() + &self.information)?;
-        Some(&self.mean + posterior.solve(&self.slope))
-    }
+/// Log evidence of a prior in nats, including the prior of its variation, up to a constant of the data.
+fn log_evidence(data: &Quadratic, unknowns: &Unknowns) -> f64 {
+    data.log_evidence(unknowns) + unknowns.variation.iter().map(log_prior).sum::<f64>()
 }
 
 /// Log density of a variation, up to a constant.
@@ -104,19 +51,40 @@ fn log_prior(variation: &Variation) -> f64 {
     [smooth, independent, length].into_iter().zip(MEDIAN.into_iter().zip(SPREAD)).map(of).sum()
 }
 
-/// Sets the variation and the exceptions of `unknowns` to the values with the greatest evidence.
-pub(super) fn learn(unknowns: &mut Unknowns, data: &Quadratic) {
+/// Sets the variation, the support changes and the exceptions of `unknowns` to the values with the greatest
+/// evidence. Returns the probability of each support change.
+pub(super) fn learn(unknowns: &mut Unknowns, data: &Quadratic) -> Vec<f64> {
+    let mut probabilities = Vec::new();
     unknowns.exceptions.clear();
+    unknowns.support_changes.clear();
     vary(unknowns, data);
-    if except(unknowns, data) {
+    loop {
+        let exception = exception(unknowns, data);
+        let change = change(unknowns, data);
+        let exception_first = exception
+            .as_ref()
+            .is_some_and(|(gain, _)| change.as_ref().is_none_or(|change| change.log_odds < *gain));
+        match change.filter(|_| !exception_first).and_then(|change| change.varied(unknowns, data)) {
+            Some((changed, probability)) => {
+                *unknowns = changed;
+                probabilities.push(probability);
+            }
+            None => match exception {
+                Some((_, exception)) => unknowns.exceptions.push(exception),
+                None => break,
+            },
+        }
+    }
+    if !unknowns.exceptions.is_empty() {
         // Without its exceptions the rest of the track is more even.
         vary(unknowns, data);
     }
+    probabilities
 }
 
 /// Changes one deviation or length after the other while the evidence rises.
 fn vary(unknowns: &mut Unknowns, data: &Quadratic) {
-    let mut best = data.log_evidence(unknowns);
+    let mut best = log_evidence(data, unknowns);
     for _ in 0..ROUNDS {
         let before = best;
         for field in Own::ALL {
@@ -124,7 +92,7 @@ fn vary(unknowns: &mut Unknowns, data: &Quadratic) {
                 for factor in FACTORS {
                     let mut tried = unknowns.clone();
                     scale(&mut tried.variation[field as usize], which, factor);
-                    let evidence = data.log_evidence(&tried);
+                    let evidence = log_evidence(data, &tried);
                     if evidence > best {
                         best = evidence;
                         unknowns.variation = tried.variation;
@@ -148,45 +116,71 @@ fn scale(variation: &mut Variation, which: usize, factor: f64) {
     *value = (*value * factor).clamp(low, high);
 }
 
-/// Adds sleepers as exceptions while the evidence rises enough, the best one first; returns whether there
-/// are any.
-fn except(unknowns: &mut Unknowns, data: &Quadratic) -> bool {
+/// The support change with the greatest evidence.
+struct Change {
+    change: SupportChange,
+    /// Logarithm of the posterior odds, if the variation stays the same.
+    log_odds: f64,
+}
+
+/// The support change with the greatest evidence, if there is room for another one.
+fn change(unknowns: &Unknowns, data: &Quadratic) -> Option<Change> {
+    if unknowns.support_changes.len() == CHANGES_MAX {
+        return None;
+    }
+    let changes: Vec<SupportChange> = SupportChange::all(unknowns.ballast().len()).collect();
+    let gains = data.gains(unknowns, &changes)?;
+    let best = gains.iter().zip(&changes).max_by(|one, other| one.0.total_cmp(other.0));
+    let (&highest, &change) = best?;
+    // Places and lengths are equally probable.
+    let all: f64 =
+        gains.iter().map(|gain| (gain - highest).exp()).sum::<f64>() / changes.len() as f64;
+    Some(Change { change, log_odds: highest + (CHANGE_ODDS * all).ln() })
+}
+
+impl Change {
+    /// The unknowns with the change and its probability, if it is more probable than not. With it the rest of the
+    /// track is more even, so that the variation is estimated again.
+    fn varied(&self, unknowns: &Unknowns, data: &Quadratic) -> Option<(Unknowns, f64)> {
+        let mut changed = unknowns.clone();
+        changed.support_changes.push(self.change);
+        let at_same = log_evidence(data, &changed);
+        vary(&mut changed, data);
+        let log_odds = self.log_odds + log_evidence(data, &changed) - at_same;
+        let probability = 1.0 / (1.0 + (-log_odds).exp());
+        (log_odds > 0.0).then_some((changed, probability.min(PROBABILITY_MAX)))
+    }
+}
+
+/// The sleeper that raises the log evidence most as an exception, if it does so by enough, and by how much more.
+fn exception(unknowns: &Unknowns, data: &Quadratic) -> Option<(f64, Exception)> {
     let sleepers = unknowns.ballast().len();
     let most = (EXCEPTIONS_MAX * sleepers as f64).ceil() as usize;
-    let mut current = data.log_evidence(unknowns);
-    loop {
-        let room = |field: Own| {
-            unknowns.exceptions.iter().filter(|known| known.field == field).count() < most
-        };
-        let fields = Own::ALL.into_iter().filter(|&field| room(field));
-        let all = fields.flat_map(|field| (0..sleepers).map(move |it| (field, it)));
-        let tried = all.map(|(field, sleeper)| Exception { field, sleeper });
-        let new = tried.filter(|exception| !unknowns.exceptions.contains(exception));
-        let with = |exception: Exception| {
-            let mut with = unknowns.clone();
-            with.exceptions.push(exception);
-            (data.log_evidence(&with), exception)
-        };
-        let best = new.map(with).max_by(|one, other| one.0.total_cmp(&other.0));
-        match best {
-            Some((evidence, exception)) if evidence > current + EXCEPTION_NATS => {
-                unknowns.exceptions.push(exception);
-                current = evidence;
-            }
-            _ => return !unknowns.exceptions.is_empty(),
-        }
-    }
+    let current = log_evidence(data, unknowns);
+    let room =
+        |field: Own| unknowns.exceptions.iter().filter(|known| known.field == field).count() < most;
+    let fields = Own::ALL.into_iter().filter(|&field| room(field));
+    let all = fields.flat_map(|field| (0..sleepers).map(move |it| (field, it)));
+    let tried = all.map(|(field, sleeper)| Exception { field, sleeper });
+    let new = tried.filter(|exception| !unknowns.exceptions.contains(exception));
+    let gain = |exception: Exception| {
+        let mut with = unknowns.clone();
+        with.exceptions.push(exception);
+        (log_evidence(data, &with) - current - EXCEPTION_NATS, exception)
+    };
+    let best = new.map(gain).max_by(|one, other| one.0.total_cmp(&other.0));
+    best.filter(|(gain, _)| *gain > 0.0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::{DMatrix, DVector};
     use rand_chacha::ChaCha8Rng;
     use rand_chacha::rand_core::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
     use tracktwin_diagnosis::{Bands, Forward, Section};
     use tracktwin_parameters::TrackDesign;
-    use tracktwin_track::extension::{ExtensionInstance, Kind};
 
     const SLEEPERS: usize = 24;
 
@@ -224,6 +218,66 @@ mod tests {
         }
     }
 
+    /// Ballast measured with a deviation of 5 % at every sleeper, whose logarithm is given.
+    fn measured_as(unknowns: &Unknowns, logarithm: impl Fn(usize) -> f64) -> Quadratic {
+        let mut information = DMatrix::zeros(unknowns.count(), unknowns.count());
+        let mut slope = DVector::zeros(unknowns.count());
+        for (sleeper, index) in unknowns.ballast().enumerate() {
+            information[(index, index)] = 0.05f64.powi(-2);
+            slope[index] = logarithm(sleeper) / 0.05f64.powi(2);
+        }
+        Quadratic { information, slope, mean: unknowns.typical() }
+    }
+
+    /// Variation along a track with a Gaussian correlation of `length` sleepers.
+    fn varied(deviation: f64, length: f64, seed: u64) -> Vec<f64> {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let white: Vec<f64> =
+            (0..3 * SLEEPERS).map(|_| StandardNormal.sample(&mut random)).collect();
+        let at = |sleeper: usize| {
+            let weight = |other: usize| {
+                let distance = (other as f64 - (sleeper + SLEEPERS) as f64) / length;
+                (-distance.powi(2)).exp()
+            };
+            let sum: f64 = (0..white.len()).map(|it| weight(it) * white[it]).sum();
+            let power: f64 = (0..white.len()).map(|it| weight(it).powi(2)).sum();
+            deviation * sum / power.sqrt()
+        };
+        (0..SLEEPERS).map(at).collect()
+    }
+
+    #[test]
+    fn a_step_and_a_soft_spot_are_found_at_their_places_beside_random_variation() {
+        let spot = SupportChange::Spot { first: 9, last: 14 };
+        let step = SupportChange::Transition { before: 11, after: 12 };
+        for change in [spot, step] {
+            let mut found = 0;
+            for seed in 0..10 {
+                let mut unknowns = unknowns();
+                let varied = varied(0.08, 0.6, seed);
+                let data = measured_as(&unknowns, |it| varied[it] - 0.6 * change.share(it));
+                learn(&mut unknowns, &data);
+                found += usize::from(unknowns.support_changes.contains(&change));
+            }
+            assert!(found >= 8, "{change:?}: {found} of 10");
+        }
+    }
+
+    #[test]
+    fn correlated_variation_is_rarely_a_change() {
+        let mut found = 0;
+        for (deviation, length) in [(0.1, 0.6), (0.15, 3.0), (0.3, 5.0)] {
+            for seed in 0..20 {
+                let mut unknowns = unknowns();
+                let varied = varied(deviation, length, 100 + seed);
+                let data = measured_as(&unknowns, |it| varied[it]);
+                learn(&mut unknowns, &data);
+                found += usize::from(!unknowns.support_changes.is_empty());
+            }
+        }
+        assert!(found <= 4, "{found} of 60");
+    }
+
     #[test]
     fn a_sleeper_far_from_its_neighbours_is_an_exception_and_leaves_theirs_alone() {
         let mut unknowns = unknowns();
@@ -234,48 +288,5 @@ mod tests {
         let best = data.best(&unknowns).unwrap() - &data.mean;
         assert!((best[9] + 0.9).abs() < 0.12, "{}", best[9]);
         assert!(best[8].abs() < 0.15 && best[10].abs() < 0.15);
-    }
-
-    #[test]
-    fn parameters_of_known_physics_are_integrated_out() {
-        let unknowns = unknowns();
-        let (count, rows) = (unknowns.count(), 3 * unknowns.count());
-        let kind = Kind::from_name("sleeper_bolt").unwrap();
-        let candidate = Candidate {
-            kind,
-            extension: ExtensionInstance::new("sleeper_bolt"),
-            free: vec![kind.parameter("stiffness_N_per_m").unwrap()],
-            trials: vec![vec![3e7]],
-            length_ratio: 1.0,
-        };
-        let mut random = ChaCha8Rng::seed_from_u64(6);
-        let mut normal = || StandardNormal.sample(&mut random);
-        let jacobian = DMatrix::from_fn(rows, count + 1, |_, _| normal());
-        let residual = DVector::from_fn(rows, |_, _| normal());
-        let (mean, deviation) = candidate.prior(candidate.free[0]);
-        let mut precision = DMatrix::zeros(count + 1, count + 1);
-        precision.view_mut((0, 0), (count, count)).copy_from(&unknowns.precision());
-        precision[(count, count)] = deviation.powi(-2);
-        let mut at = DVector::from_fn(count + 1, |_, _| 0.0);
-        at.rows_mut(0, count).copy_from(&unknowns.typical());
-        at[count] = mean;
-        // The fit is somewhere near.
-        let values = &at + DVector::from_fn(count + 1, |_, _| 0.1);
-        let posterior = Cholesky::new(precision + jacobian.transpose() * &jacobian).unwrap();
-        let right = jacobian.tr_mul(&(&residual + &jacobian * (&values - &at)));
-        let expected = &at + posterior.solve(&right);
-        let calibration = Calibration {
-            gradient: DVector::zeros(count + 1),
-            values,
-            residual,
-            jacobian,
-            precision: posterior,
-            objective: 0.0,
-            log_evidence: 0.0,
-            others: Vec::new(),
-        };
-        let data = Quadratic::new(&calibration, unknowns.typical(), &[candidate]).unwrap();
-        let best = data.best(&unknowns).unwrap();
-        assert!((best - expected.rows(0, count)).amax() < 1e-8);
     }
 }
