@@ -1,8 +1,8 @@
 //! Findings of an inspection as hypotheses, in addition to those of the model.
 
-use super::{Evidence, FAILED_SHARE, names};
+use super::{Evidence, FAILED_SHARE, NAMED_SHARE, names};
 use crate::estimate::Estimate;
-use crate::outcome::{Hypothesis, Location, UNKNOWN};
+use crate::outcome::{Hypothesis, Location, UNKNOWN, meet};
 use std::collections::BTreeMap;
 use tracktwin_inspection::Finding;
 use tracktwin_track::extension::{Class, Kind, LookAlikeGroup, PlaceKind};
@@ -45,6 +45,10 @@ impl Evidence<'_> {
                 return;
             }
         }
+        let shown = seen(finding, kind, location.clone());
+        if share_with_fitted(shown, self.probability_max(), all) {
+            return;
+        }
         let sleepers = self.prepared.forward.section.sleepers;
         let explained = !kind.measuring_chain
             && all.iter().any(|known| {
@@ -71,6 +75,28 @@ impl Evidence<'_> {
             ..seen(finding, kind, location)
         });
     }
+}
+
+/// If the model explains a defect of the rail by another kind than the passes show there, each method can be wrong:
+/// divides the probability, at most `most`, between the two kinds. Returns whether it did.
+fn share_with_fitted(shown: Hypothesis, most: f64, all: &mut Vec<Hypothesis>) -> bool {
+    let group = |known: &Hypothesis| Kind::from_name(&known.physics).map(|it| it.group);
+    let is_there = |known: &Hypothesis| meet(known.location.as_ref(), shown.location.as_ref());
+    let is_fitted = |known: &&mut Hypothesis| {
+        known.accepted
+            && known.physics != shown.physics
+            && group(known) == Some(LookAlikeGroup::RailDefect)
+            && is_there(known)
+    };
+    if group(&shown) != Some(LookAlikeGroup::RailDefect) {
+        return false;
+    }
+    let Some(fitted) = all.iter_mut().find(is_fitted) else { return false };
+    let whole = fitted.probability.min(most);
+    fitted.probability = NAMED_SHARE * whole;
+    all.retain(|known| known.accepted || known.physics != shown.physics || !is_there(known));
+    all.push(Hypothesis { probability: (1.0 - NAMED_SHARE) * whole, accepted: false, ..shown });
+    true
 }
 
 /// Takes the wavelength of a finding if it is known better than the fitted one: the passes resolve a line, the
@@ -178,6 +204,26 @@ mod tests {
         finding.parameters.insert(WAVELENGTH, (0.045, 5e-5));
         take_wavelength(&mut known, &finding);
         assert_eq!(known.parameters[WAVELENGTH], Estimate { mean: 0.045, sd: 5e-5 });
+    }
+
+    #[test]
+    fn where_fit_and_passes_disagree_about_a_shape_no_name_is_sure() {
+        let at = |ids: [&str; 2]| Location {
+            x_m: [1.0, 1.0],
+            sleepers: ids.map(str::to_owned).to_vec(),
+        };
+        let fitted = Hypothesis {
+            probability: 1.0,
+            ..Hypothesis::accepted("squat", Some(at(["SN12", "SN13"])))
+        };
+        let shown = |ids| Hypothesis::accepted("rail_joint", Some(at(ids)));
+        let mut all = vec![fitted];
+        assert!(!share_with_fitted(shown(["SN20", "SN21"]), 0.97, &mut all));
+        assert!(share_with_fitted(shown(["SN12", "SN13"]), 0.97, &mut all));
+        let [squat, joint] = &all[..] else { panic!("{all:?}") };
+        assert!(squat.accepted && !joint.accepted);
+        assert!((squat.probability - 0.6305).abs() < 1e-9, "{}", squat.probability);
+        assert!((joint.probability - 0.3395).abs() < 1e-9, "{}", joint.probability);
     }
 
     #[test]
