@@ -3,6 +3,7 @@
 use crate::evaluation_page::maps_at;
 use crate::{UNDER_LOAD, capital};
 use maud::{Markup, html};
+use std::collections::BTreeMap;
 use tracktwin_drawing::{Axis, Chart, Shown, figure, page, sheet, significant};
 use tracktwin_evaluation::{Estimate, Estimates, Evaluation};
 use tracktwin_inversion::{COMMON, Inversion, PER_SLEEPER, Sleeper, beside};
@@ -30,7 +31,8 @@ pub fn inversion_page(
         (banner(inversion))
         h2 { "Along the track" }
         (figure(&charts(inversion, None), "Posterior mean at every sleeper with a band of two standard deviations. Hollow \
-             dots: not valid, the track model does not explain the measured data there."))
+             dots: not valid, the track model does not explain the measured data there. Vertical lines, if any: ends of a \
+             transition or of a soft or stiff spot."))
         (common(inversion))
         (variation(inversion))
         h2 { "Measured data" }
@@ -137,6 +139,12 @@ fn chart(inversion: &Inversion, models: Option<&Evaluation>, parameter: Paramete
         chart.explain("a", "inversion");
     }
     chart.curve("a", &valid);
+    if parameter == Parameter::BallastStiffness {
+        let ends = inversion.support_changes.iter().flat_map(|change| &change.sleepers);
+        let places = inversion.sleepers.iter().map(|sleeper| (&sleeper.id, sleeper.x_m));
+        let places: BTreeMap<_, _> = places.collect();
+        ends.filter_map(|id| places.get(id)).for_each(|&x_m| chart.vertical(x_m));
+    }
     if !invalid.is_empty() {
         chart.dots("hollow", 2.6, &invalid.iter().map(|p| (p.0, p.1)).collect::<Vec<_>>());
         chart.explain("hollow", "not valid");
