@@ -82,7 +82,7 @@ impl SupportChange {
     }
 
     /// Weights of the sleepers' logarithms whose sum is the change: the sleepers behind a transition against those
-    /// before it, at most [`COMPARED`] each; those of a spot against as many on both sides.
+    /// before it, at most four each; those of a spot against as many on both sides.
     pub fn contrast(self, sleepers: usize) -> DVector<f64> {
         let mut contrast = DVector::zeros(sleepers);
         let mut add = |range: Range<usize>, weight: f64| {

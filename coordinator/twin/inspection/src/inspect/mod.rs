@@ -141,9 +141,12 @@ pub fn inspect(recording: &Recording) -> Inspection {
     findings.extend(scale.as_ref().map(scale_finding));
     let comb = unknown_wheel(recording);
     findings.extend(comb.as_ref().map(comb_finding));
-    // Blows of a flat lie elsewhere in every pass: passes with them are not to be laid on each other.
+    let pass_defects = chain::pass_defects(recording, &offsets);
+    // Blows of a flat lie elsewhere in every pass, and clipped crests are alike: passes with them are not to be laid
+    // on each other.
     let alarm = EACH_TEST.ln() - (offsets.len().max(1) as f64).ln();
-    let is_error = |pair: &Offsets| flat.is_none() && pair.ln_p() <= alarm;
+    let is_comparable = |pair: &Offsets| flat.is_none() && !is_saturated(pair, &pass_defects);
+    let is_error = |pair: &Offsets| is_comparable(pair) && pair.ln_p() <= alarm;
     findings.extend(offsets.iter().filter(|pair| is_error(pair)).map(offset_finding));
     let misplaced = chain::misplaced(&offsets, is_error);
     let misplaced = if leaves_speeds(recording, &misplaced) { misplaced } else { Vec::new() };
@@ -157,7 +160,7 @@ pub fn inspect(recording: &Recording) -> Inspection {
         nameless: Vec::new(),
         flat,
         loss_of_contact,
-        pass_defects: chain::pass_defects(recording, &offsets),
+        pass_defects,
         noise_floors: chain::noise_floors(recording),
         hum,
         gains,
@@ -165,6 +168,13 @@ pub fn inspect(recording: &Recording) -> Inspection {
         misplaced,
         comb,
     }
+}
+
+/// Whether one of two passes is saturated.
+fn is_saturated(pair: &Offsets, pass_defects: &[PassDefect]) -> bool {
+    pass_defects.iter().any(
+        |defect| matches!(defect, PassDefect::Saturated { pass, .. } if pair.passes.contains(pass)),
+    )
 }
 
 /// Whether two speeds are left without these passes.
@@ -252,7 +262,8 @@ fn common_places(blows_m: &[Vec<f64>], speeds: &[Vec<usize>], reach_m: f64) -> V
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::along::testing::{Rolled, independent};
+    use crate::along::testing::{Chain, Rolled, independent};
+    use tracktwin_track::extension::CLIPPING;
 
     /// Names that the passes of a recording give.
     fn names(recording: &Recording) -> Vec<&'static str> {
@@ -290,6 +301,32 @@ mod tests {
                 assert_eq!(names(&recording), [expected], "{}", recording.name);
             }
         }
+    }
+
+    #[test]
+    fn passes_that_are_mostly_clipped_are_not_laid_on_each_other() {
+        let shift = |pass: usize, position_m: &mut [f64]| {
+            if pass == 1 {
+                for x_m in position_m {
+                    *x_m += 0.016;
+                }
+            }
+        };
+        let shifted = |pass: usize, _: &mut [f64], position_m: &mut [f64]| shift(pass, position_m);
+        let clipped = |pass: usize, samples: &mut [f64], position_m: &mut [f64]| {
+            shift(pass, position_m);
+            let mean_square = samples.iter().map(|it| it * it).sum::<f64>() / samples.len() as f64;
+            let limit = 0.3 * mean_square.sqrt();
+            for sample in samples {
+                *sample = sample.clamp(-limit, limit);
+            }
+        };
+        let finds = |chain: &Chain<'_>, physics: &str| {
+            let recording = Rolled { chain, ..Rolled::faultless(6) }.recording();
+            inspect(&recording).findings.iter().any(|finding| finding.physics == physics)
+        };
+        assert!(finds(&shifted, POSITION_ERROR.physics));
+        assert!(finds(&clipped, CLIPPING.physics) && !finds(&clipped, POSITION_ERROR.physics));
     }
 
     #[test]
