@@ -3,7 +3,6 @@
 use crate::evaluation_page::maps_at;
 use crate::{UNDER_LOAD, capital};
 use maud::{Markup, html};
-use std::collections::BTreeMap;
 use tracktwin_drawing::{Axis, Chart, Shown, figure, page, sheet, significant};
 use tracktwin_evaluation::{Estimate, Estimates, Evaluation};
 use tracktwin_inversion::{COMMON, Inversion, PER_SLEEPER, Sleeper, beside};
@@ -64,7 +63,7 @@ pub(crate) fn section(inversion: &Inversion, models: &Evaluation) -> Markup {
              for every sleeper, and without the library." }
         @for compared in beside(inversion, models) { p { (capital(&compared.sentence())) } }
         @for note in inversion.notes.iter().filter(|note| !models.notes.contains(note)) { p { (note) } }
-        (figure(&charts(inversion, Some(models)), "Bold: inversion. Dashed grey: Gaussian processes of the library. Bands are two standard deviations."))
+        (figure(&charts(inversion, Some(models)), "Bold: inversion. Dashed grey: Gaussian processes of the library. Bands are two standard deviations. Vertical lines, if any: ends of a transition or of a soft or stiff spot."))
         (common(inversion))
     }
 }
@@ -140,10 +139,12 @@ fn chart(inversion: &Inversion, models: Option<&Evaluation>, parameter: Paramete
     }
     chart.curve("a", &valid);
     if parameter == Parameter::BallastStiffness {
-        let ends = inversion.support_changes.iter().flat_map(|change| &change.sleepers);
-        let places = inversion.sleepers.iter().map(|sleeper| (&sleeper.id, sleeper.x_m));
-        let places: BTreeMap<_, _> = places.collect();
-        ends.filter_map(|id| places.get(id)).for_each(|&x_m| chart.vertical(x_m));
+        let is_end = |sleeper: &&Sleeper| {
+            inversion.support_changes.iter().any(|change| change.sleepers.contains(&sleeper.id))
+        };
+        for sleeper in inversion.sleepers.iter().filter(is_end) {
+            chart.vertical(sleeper.x_m);
+        }
     }
     if !invalid.is_empty() {
         chart.dots("hollow", 2.6, &invalid.iter().map(|p| (p.0, p.1)).collect::<Vec<_>>());
