@@ -3,7 +3,8 @@
 use crate::capital;
 use maud::{Markup, html};
 use tracktwin_drawing::{Axis, Chart, Shown, figure, page, sheet, significant};
-use tracktwin_hammer::{Beside, HammerRecord, Interval, Loaded, NINETY_PER_CENT, Sleeper};
+use tracktwin_hammer::{Beside, HammerRecord, Interval, Loaded, Sleeper};
+use tracktwin_number::NORMAL_90;
 use tracktwin_parameters::Parameter;
 
 /// Parameters of the charts, as in the paper; bending stiffness follows if the test determines it.
@@ -99,8 +100,7 @@ fn chart(record: &HammerRecord, loaded: Option<&Loaded>, parameter: Parameter) -
     let places = || record.sleepers.iter().map(|sleeper| sleeper.x_m);
     let (first, last) = (places().fold(f64::MAX, f64::min), places().fold(f64::MIN, f64::max));
     // Ends of a 90 % interval, as those of the hammer test.
-    let under_load =
-        |[mean, sd]: [f64; 2]| (mean / shown.divisor, NINETY_PER_CENT * sd / shown.divisor);
+    let under_load = |[mean, sd]: [f64; 2]| (mean / shown.divisor, NORMAL_90 * sd / shown.divisor);
     let behind: Vec<(f64, f64, f64)> = loaded
         .iter()
         .flat_map(|loaded| &loaded.sleepers)

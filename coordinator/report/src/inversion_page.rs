@@ -39,7 +39,7 @@ pub fn inversion_page(
              sleepers. The synchrosqueezed transform (SSWT) shows the same power as the wavelet \
              transform (CWT), sharpened in frequency."))
         h2 { "Estimates" }
-        p.note { "Mean ± one standard deviation. Rows in italics are not valid. Misfit: mean square of the residual over its expectation; above 2 the track model does not explain the recording there. " (UNDER_LOAD) }
+        p.note { "Mean ± one standard deviation. Rows in italics are not valid. Misfit: mean square of the whitened residual, about 0.7 if the track model is valid; above 2 the track model does not explain the recording there. " (UNDER_LOAD) }
         div.scroll { (table(inversion)) }
         h2 { "Provenance" }
         (provenance(inversion, command))
@@ -69,12 +69,12 @@ pub(crate) fn section(inversion: &Inversion, models: &Evaluation) -> Markup {
 }
 
 fn banner(inversion: &Inversion) -> Markup {
+    // The first note is on the sleepers whose estimates are not valid, if there are any.
+    let alerts = usize::from(inversion.outside_library.share > 0.0);
+    let (alerts, notes) = inversion.notes.split_at(alerts.min(inversion.notes.len()));
     html! {
-        @if inversion.outside_library.share > 0.0 {
-            div.banner role="alert" { @for note in &inversion.notes { p { (note) } } }
-        } @else {
-            @for note in &inversion.notes { p { (note) } }
-        }
+        @for alert in alerts { div.banner role="alert" { p { (alert) } } }
+        @for note in notes { p { (note) } }
     }
 }
 

@@ -1,4 +1,4 @@
-//! Numbers as text for readers: on pages, in messages and in sentences.
+//! Numbers as text for readers: on pages, in messages and in sentences; quantiles of the normal distribution.
 //!
 //! This crate defines the number of digits, and the text for numbers that are too large or too small to
 //! be measured. The pages add units with prefixes. Files for programs contain the numbers themselves.
@@ -10,6 +10,12 @@ pub const PROBABILITY_LEAST: f64 = 1e-12;
 
 /// Largest ratio that is stated as a number. The text for a larger ratio is "more than 1000".
 pub const RATIO_GREATEST: f64 = 1000.0;
+
+/// Half width of the central 90 % interval of a normal distribution, in standard deviations.
+pub const NORMAL_90: f64 = 1.644_853_626_951_472_7;
+
+/// Upper quartile of a normal distribution, in standard deviations.
+pub const NORMAL_QUARTILE: f64 = 0.674_489_750_196_081_7;
 
 /// Largest number of decimals.
 const DECIMALS_MAX: i64 = 9;

@@ -1,12 +1,12 @@
 //! Accuracy of the inversion on uneven tracks recorded by another simulator.
 
-use super::score::WIDTH_90;
 use crate::pipeline::compute::compute;
 use crate::pipeline::invert::{InvertingError, invert};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use tracktwin_inversion::Inversion;
 use tracktwin_library::Library;
+use tracktwin_number::NORMAL_90;
 use tracktwin_parameters::{Parameter, Preset};
 use tracktwin_reference_simulator::{Scene, SleeperTruth, TruthError};
 use tracktwin_ring::correlation;
@@ -120,7 +120,7 @@ impl Scores {
                 let truth = truth_of(&scene.sleepers[number(&sleeper.id)]);
                 let error = (estimate.mean / truth).ln();
                 self.errors.entry(parameter).or_default().push(error.abs());
-                let holds = (estimate.mean - truth).abs() <= WIDTH_90 * estimate.sd;
+                let holds = (estimate.mean - truth).abs() <= NORMAL_90 * estimate.sd;
                 *self.held.entry(parameter).or_default() += usize::from(holds);
                 pairs.push((estimate.mean.ln(), truth.ln()));
             }

@@ -5,10 +5,8 @@ use super::track::Track;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use tracktwin_evaluation::Evaluation;
+use tracktwin_number::NORMAL_90;
 use tracktwin_parameters::Parameter;
-
-/// Half width of the 90 % interval of a normal distribution, in standard deviations.
-pub(super) const WIDTH_90: f64 = 1.644_853_626_951_472_7;
 
 /// Result for the tracks of one row.
 #[derive(Clone, Debug, Serialize)]
@@ -134,7 +132,7 @@ impl Sums {
             let even =
                 sleeper.sd_without_unevenness.get(&parameter).copied().unwrap_or(estimate.sd);
             let error = (estimate.mean - truth).abs();
-            let held = |sd: f64| f64::from(u8::from(error <= WIDTH_90 * sd));
+            let held = |sd: f64| f64::from(u8::from(error <= NORMAL_90 * sd));
             self.sleepers += 1.0;
             self.mean += estimate.mean;
             self.sd += estimate.sd / truth;

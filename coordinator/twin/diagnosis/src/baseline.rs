@@ -253,8 +253,8 @@ impl Unknowns {
         self.covariance().diagonal().map(f64::sqrt)
     }
 
-    /// A change of the ballast stiffness in all unknowns; its amplitude has a standard deviation of one.
-    pub fn direction(&self, change: SupportChange) -> DVector<f64> {
+    /// Change of all unknowns by a support change whose amplitude is one standard deviation of its prior.
+    pub fn along_change(&self, change: SupportChange) -> DVector<f64> {
         let mut direction = DVector::zeros(self.count());
         for (sleeper, index) in self.ballast().enumerate() {
             direction[index] = prior::SUPPORT_CHANGE * change.share(sleeper);
@@ -262,11 +262,18 @@ impl Unknowns {
         direction
     }
 
+    /// Change of all unknowns by an exception of one standard deviation of its prior.
+    pub fn along_exception(&self, Exception { field, sleeper }: Exception) -> DVector<f64> {
+        let mut direction = DVector::zeros(self.count());
+        direction[self.at(field, sleeper)] = prior::EXCEPTION;
+        direction
+    }
+
     /// Inverse of the prior covariance, with exceptions and support changes.
     pub fn precision(&self) -> DMatrix<f64> {
         let mut covariance = self.covariance();
         for &change in &self.support_changes {
-            let direction = self.direction(change);
+            let direction = self.along_change(change);
             covariance.ger(1.0, &direction, &direction, 1.0);
         }
         for &Exception { field, sleeper } in &self.exceptions {

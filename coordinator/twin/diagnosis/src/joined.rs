@@ -8,6 +8,7 @@ use crate::outcome::{
     SectionVerdict, Verdict,
 };
 use crate::prepared_recording::overlapping;
+use crate::section::owner;
 use crate::sentence::sentence;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -98,15 +99,10 @@ impl Whole<'_> {
         self.ids.iter().position(|known| known == id)
     }
 
-    /// The section in which a sleeper lies farthest from the ends; of two equal ones the first.
+    /// The section to which a sleeper belongs.
     fn owner(&self, sleeper: usize) -> Option<usize> {
-        let depth = |section: usize| {
-            let Range { start, end } = self.sections[section].sleepers;
-            (sleeper - start).min(end - sleeper - 1)
-        };
-        let there = (0..self.sections.len())
-            .filter(|&section| self.sections[section].sleepers.contains(&sleeper));
-        there.reduce(|best, other| if depth(other) > depth(best) { other } else { best })
+        let ranges: Vec<_> = self.sections.iter().map(|it| it.sleepers.clone()).collect();
+        owner(&ranges, sleeper)
     }
 
     /// Indices of the sleepers that belong to a section.

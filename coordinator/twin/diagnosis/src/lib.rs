@@ -59,7 +59,7 @@ pub use prepared_recording::{PreparationError, PreparedRecording, check_track};
 pub use quantity::{Common, Own};
 pub use screen::{Template, templates};
 pub use search::{Fitted, Round, SearchOutcome, Stage, first_calibration, search};
-pub use section::Section;
+pub use section::{Section, owner};
 pub use signature::signature;
 pub use spectra::{Spectra, SpeedSpectra, are_one_speed};
 pub use variation::{Exception, SupportChange, Variation};

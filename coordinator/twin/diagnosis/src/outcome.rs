@@ -183,7 +183,8 @@ pub struct Hypothesis {
     pub would_separate: String,
     /// Detectability d': norm of the whitened signature after the baseline was fitted again.
     pub detectability: f64,
-    /// Log ratio of the evidence to the model without the hypothesis, in nats.
+    /// Log ratio of the evidence to the model without the hypothesis, in nats. For what only the passes show, minus
+    /// the logarithm of its p-value.
     pub log_evidence: f64,
 }
 

@@ -223,6 +223,11 @@ impl Measured {
 }
 
 impl PreparedRecording {
+    /// Indices in the recording of the compared sleepers.
+    pub fn sleepers(&self) -> Range<usize> {
+        self.first_sleeper..self.first_sleeper + self.forward.section.sleepers
+    }
+
     /// Prepares a recording for comparison with `track`, without the passes with the indices `except`.
     ///
     /// # Errors

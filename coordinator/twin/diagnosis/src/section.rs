@@ -38,6 +38,17 @@ impl Window {
     }
 }
 
+/// Index of the section in which a sleeper lies farthest from the ends; of two equal ones the first. `None` if it lies
+/// in no section. Sections are ranges of sleepers.
+pub fn owner(sections: &[Range<usize>], sleeper: usize) -> Option<usize> {
+    let depth = |section: usize| {
+        let Range { start, end } = sections[section];
+        (sleeper - start).min(end - sleeper - 1)
+    };
+    let there = (0..sections.len()).filter(|&section| sections[section].contains(&sleeper));
+    there.reduce(|best, other| if depth(other) > depth(best) { other } else { best })
+}
+
 /// A stretch of sleepers and the track around it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Section {

@@ -73,6 +73,19 @@ impl SupportChange {
         })
     }
 
+    /// The same change this number of sleepers farther along the track.
+    #[must_use]
+    pub fn behind(self, sleepers: usize) -> Self {
+        match self {
+            Self::Transition { before, after } => {
+                Self::Transition { before: before + sleepers, after: after + sleepers }
+            }
+            Self::Spot { first, last } => {
+                Self::Spot { first: first + sleepers, last: last + sleepers }
+            }
+        }
+    }
+
     /// The last sleeper before the change and the first one behind it.
     pub fn neighbours(self) -> (usize, usize) {
         match self {
@@ -82,25 +95,28 @@ impl SupportChange {
     }
 
     /// Weights of the sleepers' logarithms whose sum is the change: the sleepers behind a transition against those
-    /// before it, at most four each; those of a spot against as many on both sides.
-    pub fn contrast(self, sleepers: usize) -> DVector<f64> {
+    /// before it, those of a spot against those on both sides. Compared are at most four on a side, as far as the next
+    /// one of `others`.
+    pub fn contrast(self, sleepers: usize, others: &[Self]) -> DVector<f64> {
         let mut contrast = DVector::zeros(sleepers);
         let mut add = |range: Range<usize>, weight: f64| {
             let share = weight / range.len() as f64;
             range.for_each(|sleeper| contrast[sleeper] += share);
         };
         let (before, after) = self.neighbours();
-        let before = (before + 1).saturating_sub(COMPARED)..before + 1;
-        let after = after..(after + COMPARED).min(sleepers);
+        let behind_others = others.iter().map(|it| it.neighbours().1).filter(|&it| it <= before);
+        let before_others = others.iter().map(|it| it.neighbours().0 + 1).filter(|&it| it > after);
+        let from = behind_others.fold((before + 1).saturating_sub(COMPARED), usize::max);
+        let to = before_others.fold((after + COMPARED).min(sleepers), usize::min);
         match self {
             Self::Transition { .. } => {
-                add(before, -1.0);
-                add(after, 1.0);
+                add(from..before + 1, -1.0);
+                add(after..to, 1.0);
             }
             Self::Spot { first, last } => {
-                add(before, -0.5);
+                add(from..before + 1, -0.5);
                 add(first..last + 1, 1.0);
-                add(after, -0.5);
+                add(after..to, -0.5);
             }
         }
         contrast
@@ -116,5 +132,23 @@ impl SupportChange {
             }
             Self::Spot { first, last } => f64::from(u8::from((first..=last).contains(&sleeper))),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_size_of_a_change_is_not_that_of_the_next_one() {
+        let step = SupportChange::Transition { before: 11, after: 12 };
+        let spot = SupportChange::Spot { first: 14, last: 15 };
+        let track = DVector::from_fn(24, |it, _| 0.6 * step.share(it) - 0.4 * spot.share(it));
+        assert!((step.contrast(24, &[spot]).dot(&track) - 0.6).abs() < 1e-12);
+        assert!((spot.contrast(24, &[step]).dot(&track) + 0.4).abs() < 1e-12);
+        // Alone it is compared with four sleepers on each side.
+        let alone = step.contrast(24, &[]);
+        assert_eq!(alone.iter().filter(|weight| **weight != 0.0).count(), 8);
+        assert!((alone.dot(&track) - 0.4).abs() < 1e-12);
     }
 }

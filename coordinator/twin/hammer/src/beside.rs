@@ -1,8 +1,9 @@
 //! Comparison of the stiffness without load (hammer test) with the stiffness under a wheel (evaluation).
 
-use crate::record::{HammerRecord, NINETY_PER_CENT};
+use crate::record::HammerRecord;
 use serde::Deserialize;
 use std::collections::BTreeMap;
+use tracktwin_number::NORMAL_90;
 use tracktwin_parameters::Parameter;
 
 /// Compared parameters, in the order of the report pages.
@@ -152,7 +153,7 @@ pub fn beside(record: &HammerRecord, loaded: &Loaded, spacing_m: f64) -> Vec<Bes
         (sleepers > 0).then(|| {
             let count = sleepers as f64;
             let (mean, deviation) = (difference / count, (variance / count).sqrt());
-            let end = |way: f64| (mean + way * NINETY_PER_CENT * deviation).exp();
+            let end = |way: f64| (mean + way * NORMAL_90 * deviation).exp();
             let ratio = [mean.exp(), end(-1.0), end(1.0)];
             let mean_differs = mean.abs() > BEYOND_CHANCE * deviation;
             let is_stiffer = if mean_differs { mean > 0.0 } else { of_differing > 0.0 };

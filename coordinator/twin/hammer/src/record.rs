@@ -4,13 +4,11 @@ use crate::fit::Fitted;
 use crate::unknowns::Quantity;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use tracktwin_number::NORMAL_90;
 use tracktwin_parameters::Parameter;
 
 /// Value of the field `format` in `estimates.json`.
 pub const FORMAT: &str = "tracktwin-hammer/1";
-
-/// Half width of the 90 % interval of a normal distribution, in standard deviations.
-pub const NINETY_PER_CENT: f64 = 1.645;
 
 /// A value is resolved if its posterior standard deviation is below this share of the prior one.
 const RESOLVED: f64 = 0.5;
@@ -95,7 +93,7 @@ pub struct Interval {
 impl Interval {
     /// Interval from the mean and the standard deviation of the logarithm.
     fn new(logarithm: f64, deviation: f64) -> Self {
-        let end = |way: f64| (logarithm + way * NINETY_PER_CENT * deviation).exp();
+        let end = |way: f64| (logarithm + way * NORMAL_90 * deviation).exp();
         Self {
             estimate: logarithm.exp(),
             lower: end(-1.0),
@@ -107,7 +105,7 @@ impl Interval {
 
     /// Standard deviation of the logarithm.
     pub fn log_deviation(&self) -> f64 {
-        (self.upper / self.lower).ln() / (2.0 * NINETY_PER_CENT)
+        (self.upper / self.lower).ln() / (2.0 * NORMAL_90)
     }
 }
 

@@ -4,13 +4,12 @@ use crate::fit::Fitted;
 use crate::record::{Along, Inversion, Prior, Provenance, Sleeper, log_normal};
 use crate::support_changes::changes;
 use std::collections::BTreeMap;
-use tracktwin_diagnosis::{Common, Own, PreparedRecording, Unknowns};
+use tracktwin_diagnosis::{Common, Mean, Own, PreparedRecording, Unknowns, owner};
 use tracktwin_evaluation::{Estimates, Flag, Unevaluated};
 use tracktwin_parameters::Parameter;
 use tracktwin_signal::recording::Recording;
 
-/// Limit of a sleeper's misfit (mean square of the residual over its expectation); above it the estimates
-/// are not valid.
+/// Limit of a sleeper's misfit; above it the estimates are not valid.
 const MISFIT_MAX: f64 = 2.0;
 
 /// Largest railpad stiffness in N/m that a recording of V-Track resolves; a stiffer railpad hardly changes
@@ -22,24 +21,16 @@ impl Inversion {
     /// Combines the sections of a recording, which must be in order. A sleeper that lies in several
     /// sections takes its estimates from the section in which its distance from an end is largest.
     pub fn of(recording: &Recording, sections: &[(PreparedRecording, Fitted)]) -> Self {
-        let covered = |(prepared, _): &(PreparedRecording, Fitted)| {
-            prepared.first_sleeper..prepared.first_sleeper + prepared.forward.section.sleepers
-        };
+        let ranges: Vec<_> = sections.iter().map(|(prepared, _)| prepared.sleepers()).collect();
         let mut sleepers = Vec::new();
         let mut unevaluated = Vec::new();
         for (number, place) in recording.sleepers.iter().enumerate() {
-            let inside =
-                |section: &&(PreparedRecording, Fitted)| covered(section).contains(&number);
-            let from_end = |section: &&(PreparedRecording, Fitted)| {
-                let range = covered(section);
-                (number - range.start).min(range.end - 1 - number)
-            };
-            let Some((prepared, fitted)) = sections.iter().filter(inside).max_by_key(from_end)
-            else {
+            let Some(section) = owner(&ranges, number) else {
                 let reason = "not every pass covers its window with a margin";
                 unevaluated.push(Unevaluated { id: place.id.clone(), x_m: place.x_m, reason });
                 continue;
             };
+            let (prepared, fitted) = &sections[section];
             let resolved = RAILPAD_RESOLVED * prepared.forward.section.track.design.length_ratio();
             let index = number - prepared.first_sleeper;
             sleepers.push(fitted.sleeper(index, &place.id, place.x_m, resolved));
@@ -104,6 +95,11 @@ fn provenance(sections: &[(PreparedRecording, Fitted)]) -> Provenance {
         let spread = unknowns.prior_deviations();
         for (of, at) in places(unknowns, 0) {
             prior.insert(of, Prior { median: typical[at].exp(), log_sd: spread[at] });
+        }
+        // Without the variation between sleepers.
+        for field in Own::ALL {
+            let Mean { log, deviation } = unknowns.mean[field as usize];
+            prior.insert(own(field), Prior { median: log.exp(), log_sd: deviation });
         }
         let along = Own::ALL.map(own).into_iter().zip(unknowns.variation);
         variation.extend(along.map(|(of, variation)| (of, Along::from(variation))));

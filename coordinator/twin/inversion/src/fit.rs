@@ -13,8 +13,8 @@ use tracktwin_signal::recording::Recording;
 /// Number of rounds; each round estimates the variation and fits the track again.
 const ROUNDS: usize = 2;
 
-/// Expected mean square of a sleeper's residual if the model is valid. It is below one, because the fit
-/// absorbs a part and the covariance includes an error of the prediction.
+/// Expected misfit of a sleeper if the model is valid. It is below one, because the fit absorbs a part and the
+/// covariance includes an error of the prediction.
 const EXPECTED: f64 = 0.7;
 
 /// Error of the predicted levels that all sleepers share, in nats: 0.4 dB, by which two simulators of
@@ -31,8 +31,8 @@ const MISPLACED: [f64; 2] = [0.35, 0.6];
 const COMMON_ERROR: f64 = 0.08;
 
 /// Grid along the valley of the posterior: step of the logarithm of the mean railpad stiffness, largest
-/// number of steps on either side, and distance of the log weight from its maximum, in nats, at which a
-/// point is negligible.
+/// number of steps on either side, and distance of the log weight from the greatest one on that side, in nats, at
+/// which a side ends. So a side has at least two steps, and a second minimum behind the first step is found.
 const STEP: f64 = 0.2;
 const STEPS_MAX: u32 = 5;
 const NEGLIGIBLE: f64 = 3.0;
@@ -58,7 +58,7 @@ pub struct Fitted {
     /// Amplitude of each support change of `unknowns`, in their order.
     pub changes: Vec<Amplitude>,
     /// Misfit of every sleeper: sum of squares of its whitened residual, divided by the number of its log
-    /// powers; one on average if the model is valid.
+    /// powers; about 0.7 if the model is valid.
     pub misfit: Vec<f64>,
 }
 
@@ -145,8 +145,7 @@ struct Held {
     calibration: Calibration,
 }
 
-/// Fits with the mean railpad stiffness fixed at values on either side of the best fit, until the weight is
-/// negligible.
+/// Fits with the mean railpad stiffness fixed at values on either side of the best fit, until the weight falls.
 ///
 /// Stiffer railpads with more damping on softer sleepers give nearly the same levels. The posterior is
 /// therefore a long valley, often with several minima, and a normal distribution about one of them is too
@@ -259,8 +258,10 @@ impl Fitted {
             },
         );
         let misplaced: Vec<_> = misplaced.collect();
+        let known = &unknowns.support_changes;
         let amplitude = |(&change, &probability): (&SupportChange, &f64)| {
-            let contrast = change.contrast(unknowns.ballast().len());
+            let others: Vec<_> = known.iter().copied().filter(|other| *other != change).collect();
+            let contrast = change.contrast(unknowns.ballast().len(), &others);
             let range = unknowns.ballast();
             let of = values.rows(range.start, range.len());
             let within = covariance.view((range.start, range.start), (range.len(), range.len()));
@@ -268,7 +269,7 @@ impl Fitted {
                 contrast.dot(&(within * &contrast)) + misplaced[0].1 * contrast.norm_squared();
             Amplitude { log: contrast.dot(&of), deviation: variance.sqrt(), probability }
         };
-        let changes = unknowns.support_changes.iter().zip(probabilities).map(amplitude).collect();
+        let changes = known.iter().zip(probabilities).map(amplitude).collect();
         for (range, variance) in misplaced {
             range.for_each(|index| deviations[index] += variance);
         }

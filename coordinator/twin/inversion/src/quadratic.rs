@@ -2,7 +2,7 @@
 //! the forward model.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
-use tracktwin_diagnosis::{Calibration, Candidate, SupportChange, Unknowns};
+use tracktwin_diagnosis::{Calibration, Candidate, Unknowns};
 
 /// Quadratic log likelihood near a fitted track, integrated over the parameters of known physics:
 /// `-0.5 x' H x + b' x` plus a constant.
@@ -61,18 +61,22 @@ impl Quadratic {
         gain + 0.5 * (prior.ln_determinant() - posterior.ln_determinant())
     }
 
-    /// Increase of the log evidence by each of `changes`, in nats.
-    pub(super) fn gains(&self, unknowns: &Unknowns, changes: &[SupportChange]) -> Option<Vec<f64>> {
+    /// Increase of the log evidence in nats if the prior includes one more variation, along each of `directions`, whose
+    /// amplitude has a standard deviation of one.
+    pub(super) fn gains(
+        &self,
+        unknowns: &Unknowns,
+        directions: &[DVector<f64>],
+    ) -> Option<Vec<f64>> {
         let posterior = Cholesky::new(unknowns.precision() + &self.information)?.inverse();
         // Of the amplitude alone, after integration over all unknowns.
         let information = &self.information - &self.information * &posterior * &self.information;
         let slope = &self.slope - &self.information * (&posterior * &self.slope);
-        let gain = |&change: &SupportChange| {
-            let direction = unknowns.direction(change);
-            let precision = 1.0 + direction.dot(&(&information * &direction));
-            0.5 * (slope.dot(&direction).powi(2) / precision - precision.ln())
+        let gain = |direction: &DVector<f64>| {
+            let precision = 1.0 + direction.dot(&(&information * direction));
+            0.5 * (slope.dot(direction).powi(2) / precision - precision.ln())
         };
-        Some(changes.iter().map(gain).collect())
+        Some(directions.iter().map(gain).collect())
     }
 
     /// The values of greatest posterior probability under a prior.

@@ -50,9 +50,9 @@ pub struct Provenance {
     pub speeds_km_h: Vec<f64>,
     /// Number of passes at each of `speeds_km_h`.
     pub passes: Vec<usize>,
-    /// Prior of the mean of every parameter.
+    /// Prior of the mean of every parameter, in the middle section.
     pub prior: BTreeMap<Parameter, Prior>,
-    /// Variation between sleepers, estimated from the recording.
+    /// Variation between sleepers, estimated from the recording, in the middle section.
     pub variation: BTreeMap<Parameter, Along>,
 }
 
@@ -93,8 +93,8 @@ pub struct Sleeper {
     /// to the sleepers of a section.
     #[serde(flatten)]
     pub estimates: Estimates,
-    /// Mean square of the residual between measured and predicted levels, divided by its expectation; about
-    /// one if the track model is valid.
+    /// Mean square of the whitened residual between measured and predicted levels; about 0.7 if the track model is
+    /// valid.
     pub misfit: f64,
     /// Flags of the estimates.
     pub flags: Vec<Flag>,

@@ -2,11 +2,11 @@
 
 use crate::fit::{Amplitude, Fitted};
 use serde::Serialize;
-use tracktwin_diagnosis::{PreparedRecording, SupportChange};
+use std::cmp::Reverse;
+use std::ops::Range;
+use tracktwin_diagnosis::{PreparedRecording, SupportChange, owner};
+use tracktwin_number::NORMAL_90;
 use tracktwin_signal::recording::Recording;
-
-/// Half width of a 90 % interval in standard deviations.
-const NINETY_PER_CENT: f64 = 1.645;
 
 /// A change of the ballast stiffness along the track that is more than its variation between sleepers.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -36,40 +36,67 @@ pub enum ChangeKind {
     StiffSpot,
 }
 
-/// All changes of the fitted sections of a recording. A change in several sections is taken from the one in which its
-/// distance from an end is largest.
+/// A change that a section found; its sleepers are indices in the recording.
+#[derive(Clone, Copy)]
+struct Found {
+    section: usize,
+    change: SupportChange,
+    amplitude: Amplitude,
+}
+
+/// All changes of the fitted sections of a recording.
 pub(crate) fn changes(
     recording: &Recording,
     sections: &[(PreparedRecording, Fitted)],
 ) -> Vec<Change> {
-    let covered = |prepared: &PreparedRecording| {
-        prepared.first_sleeper..prepared.first_sleeper + prepared.forward.section.sleepers
-    };
-    let mut placed = Vec::new();
-    for (number, (prepared, fitted)) in sections.iter().enumerate() {
-        for (&change, amplitude) in fitted.unknowns.support_changes.iter().zip(&fitted.changes) {
-            let (before, after) = change.neighbours();
-            let middle = prepared.first_sleeper + usize::midpoint(before, after);
-            let from_end = |(other, _): &(PreparedRecording, Fitted)| {
-                let range = covered(other);
-                range.contains(&middle).then(|| (middle - range.start).min(range.end - 1 - middle))
-            };
-            let farthest = (0..sections.len()).max_by_key(|&other| from_end(&sections[other]));
-            if farthest == Some(number) {
-                placed.push((middle, Change::new(recording, prepared, change, *amplitude)));
-            }
+    let ranges: Vec<_> = sections.iter().map(|(prepared, _)| prepared.sleepers()).collect();
+    let mut all = Vec::new();
+    for (section, (prepared, fitted)) in sections.iter().enumerate() {
+        for (change, &amplitude) in fitted.unknowns.support_changes.iter().zip(&fitted.changes) {
+            let change = change.behind(prepared.first_sleeper);
+            all.push(Found { section, change, amplitude });
         }
     }
-    placed.sort_by_key(|(middle, _)| *middle);
-    placed.into_iter().map(|(_, change)| change).collect()
+    let mut kept: Vec<Found> =
+        all.iter().copied().filter(|it| is_stated(it, &all, &ranges)).collect();
+    kept.sort_by_key(Found::middle);
+    kept.into_iter().map(|it| Change::new(recording, it)).collect()
+}
+
+/// Whether a change is stated. One that a single section found is stated if its middle belongs to that section. If
+/// several sections found it, a spot explains more than a transition, of which a section shows one end; otherwise it
+/// is that of the section in which it lies farthest from the ends.
+fn is_stated(found: &Found, all: &[Found], sections: &[Range<usize>]) -> bool {
+    let rank = |it: &Found| {
+        let Range { start, end } = sections[it.section];
+        let is_spot = matches!(it.change, SupportChange::Spot { .. });
+        (is_spot, (it.middle() - start).min(end - 1 - it.middle()), Reverse(it.section))
+    };
+    let mut same = all.iter().filter(|other| found.is_same(other)).peekable();
+    if same.peek().is_none() {
+        return owner(sections, found.middle()) == Some(found.section);
+    }
+    same.all(|other| rank(found) > rank(other))
+}
+
+impl Found {
+    fn middle(&self) -> usize {
+        let (before, after) = self.change.neighbours();
+        usize::midpoint(before, after)
+    }
+
+    /// Whether another section found the same change: they overlap.
+    fn is_same(&self, other: &Self) -> bool {
+        let (before, after) = self.change.neighbours();
+        let (other_before, other_after) = other.change.neighbours();
+        self.section != other.section && before <= other_after && other_before <= after
+    }
 }
 
 impl Change {
     fn new(
         recording: &Recording,
-        prepared: &PreparedRecording,
-        change: SupportChange,
-        Amplitude { log, deviation, probability }: Amplitude,
+        Found { change, amplitude: Amplitude { log, deviation, probability }, .. }: Found,
     ) -> Self {
         let (kind, ends) = match change {
             SupportChange::Transition { before, after } => {
@@ -80,8 +107,8 @@ impl Change {
             }
             SupportChange::Spot { first, last } => (ChangeKind::StiffSpot, [first, last]),
         };
-        let id = |sleeper: usize| recording.sleepers[prepared.first_sleeper + sleeper].id.clone();
-        let end = |way: f64| (log + way * NINETY_PER_CENT * deviation).exp_m1();
+        let id = |sleeper: usize| recording.sleepers[sleeper].id.clone();
+        let end = |way: f64| (log + way * NORMAL_90 * deviation).exp_m1();
         Self {
             kind,
             sleepers: ends.map(id),
@@ -104,14 +131,15 @@ impl Change {
         };
         let where_to = match self.kind {
             ChangeKind::Transition => {
-                format!("changes by {change} % from {first} to {last} and stays so")
+                format!("changes by {change} % from {first} to {last}")
             }
             ChangeKind::SoftSpot | ChangeKind::StiffSpot => {
                 format!("from {first} to {last} differs by {change} % from that on both sides")
             }
         };
         format!(
-            "The ballast stiffness {where_to} (90 % interval {lower} to {upper} %): a {form}, {sure:.0} % probable."
+            "The ballast stiffness {where_to} (90 % interval {lower} to {upper} %). With a probability of {sure:.0} % this is \
+             more than its variation between sleepers, most likely a {form}."
         )
     }
 }
@@ -130,7 +158,31 @@ mod tests {
             interval_90: [-0.47, -0.39],
         };
         let expected = "The ballast stiffness from SN16 to SN21 differs by -43 % from that on both sides (90 % interval -47 \
-                        to -39 %): a soft spot, 90 % probable.";
+                        to -39 %). With a probability of 90 % this is more than its variation between sleepers, most \
+                        likely a soft spot.";
         assert_eq!(change.sentence(), expected);
+    }
+
+    /// Changes that the sections 0..26 and 18..44 found, and the number of stated ones of each form.
+    fn stated(found: &[(usize, SupportChange)]) -> Vec<SupportChange> {
+        let amplitude = Amplitude { log: 0.5, deviation: 0.1, probability: 0.9 };
+        let all = found.iter().map(|&(section, change)| Found { section, change, amplitude });
+        let all: Vec<Found> = all.collect();
+        let kept = all.iter().filter(|it| is_stated(it, &all, &[0..26, 18..44]));
+        kept.map(|it| it.change).collect()
+    }
+
+    #[test]
+    fn a_change_in_two_sections_is_stated_once() {
+        let step = |before| SupportChange::Transition { before, after: before + 1 };
+        let spot = SupportChange::Spot { first: 20, last: 27 };
+        // The first section does not see the end of the spot.
+        assert_eq!(stated(&[(0, step(19)), (1, spot)]), [spot]);
+        // Both sections see it, and differ by a sleeper where the middle between them lies.
+        assert_eq!(stated(&[(0, step(22)), (1, step(21))]), [step(22)]);
+        assert_eq!(stated(&[(0, step(21)), (1, step(22))]), [step(21)]);
+        // The second section lies deeper around it and does not see it.
+        assert_eq!(stated(&[(0, step(23))]), []);
+        assert_eq!(stated(&[(0, step(10)), (1, step(30))]), [step(10), step(30)]);
     }
 }

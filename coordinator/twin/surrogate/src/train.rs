@@ -9,9 +9,8 @@ use crate::{
 };
 use faer::Mat;
 use std::sync::OnceLock;
+use tracktwin_number::NORMAL_90;
 
-/// Half width of the 90 % interval of a normal distribution, in standard deviations.
-const WIDTH_90: f64 = 1.644_853_626_951_472_7;
 /// Smallest number of entries for a training: a hundred for the hyper-parameters and a hundred for the
 /// test.
 pub const ENTRIES_MIN: usize = 200;
@@ -248,7 +247,7 @@ fn test(group: &mut ModelGroup, features: &Mat<f64>, targets: &Mat<f64>) -> Resu
         let difference: f64 = mean.iter().zip(&truth).map(|(m, t)| m - t).sum();
         model.score.mase_test = mase(&truth, &mean, 1.0);
         model.score.bias_test = difference / truth.len() as f64;
-        model.score.coverage_90_test = coverage(&truth, &mean, &column(&sds, j), WIDTH_90);
+        model.score.coverage_90_test = coverage(&truth, &mean, &column(&sds, j), NORMAL_90);
     }
     Ok(())
 }

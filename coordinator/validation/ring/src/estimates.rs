@@ -4,10 +4,8 @@ use crate::RingError;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use tracktwin_evaluation::{Estimate, Estimates};
+use tracktwin_number::NORMAL_90;
 use tracktwin_parameters::Parameter;
-
-/// Standard deviations between the mean and an end of the 90 % interval.
-pub(crate) const WIDTH_90: f64 = 1.645;
 
 /// Estimates of one sleeper.
 #[derive(Clone, Debug, PartialEq)]
@@ -101,12 +99,12 @@ pub(crate) fn sd_share(estimate: Estimate, parameter: Parameter) -> f64 {
 
 /// Whether a value lies in the 90 % interval of an estimate.
 pub(crate) fn holds(estimate: Estimate, value: f64) -> bool {
-    (estimate.mean - value).abs() <= WIDTH_90 * estimate.sd
+    (estimate.mean - value).abs() <= NORMAL_90 * estimate.sd
 }
 
 /// Whether two estimates agree: their difference lies in its own 90 % interval.
 pub(crate) fn agree(one: Estimate, other: Estimate) -> bool {
-    (one.mean - other.mean).abs() <= WIDTH_90 * one.sd.hypot(other.sd)
+    (one.mean - other.mean).abs() <= NORMAL_90 * one.sd.hypot(other.sd)
 }
 
 /// Median of the values. `None` without values.

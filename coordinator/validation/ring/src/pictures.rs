@@ -1,9 +1,10 @@
 //! Pictures of the ring like the paper's Figs. 13a, 20, 21, 22 and 24.
 
-use crate::estimates::{WIDTH_90, mean};
+use crate::estimates::mean;
 use crate::parameters::{ALONG, OWN};
 use crate::{Estimated, Method, RailSpectra, SleeperTruth, Study};
 use tracktwin_evaluation::Estimate;
+use tracktwin_number::NORMAL_90;
 use tracktwin_parameters::Parameter;
 use tracktwin_reproduction::{Curve, Picture, Scale, Style};
 
@@ -125,7 +126,7 @@ fn points(
 fn band(study: &Study, name: String, estimated: &Estimated, parameter: Parameter) -> Curve {
     let (divisor, _) = unit(parameter);
     let means = points(study, estimated, parameter, |of| of.mean / divisor);
-    let half = points(study, estimated, parameter, |of| WIDTH_90 * of.sd / divisor);
+    let half = points(study, estimated, parameter, |of| NORMAL_90 * of.sd / divisor);
     curve(name, Style::Band(half.into_iter().map(|point| point.1).collect()), means)
 }
 

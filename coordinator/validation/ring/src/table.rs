@@ -1,7 +1,7 @@
 //! `truth.csv` and `ring.csv`, with one row per sleeper.
 
-use crate::estimates::WIDTH_90;
 use crate::{SleeperTruth, Study, Truth};
+use tracktwin_number::NORMAL_90;
 use tracktwin_parameters::Parameter;
 
 /// Columns of the truth before its values.
@@ -44,7 +44,7 @@ impl Study {
                         row.extend(PARTS.map(|_| String::new()));
                         continue;
                     };
-                    let half = WIDTH_90 * of.sd;
+                    let half = NORMAL_90 * of.sd;
                     let valid = estimated.valid(&sleeper.id, parameter).is_some();
                     row.extend([of.mean, of.mean - half, of.mean + half].map(|it| it.to_string()));
                     row.push(valid.to_string());
@@ -95,7 +95,8 @@ mod tests {
         assert_eq!(lines.len(), 101);
         assert!(lines[0].contains("inversion_railpad_stiffness_N_m_low_90"), "{}", lines[0]);
         assert!(lines[91].starts_with("SN91,11.25,1,,false,true,true,10000000,"), "{}", lines[91]);
-        assert!(lines[91].contains(",10000000,8355000,11645000,true"), "{}", lines[91]);
+        assert!(lines[91].contains(",10000000,8355146."), "{}", lines[91]);
+        assert!(lines[91].contains(",11644853."), "{}", lines[91]);
         assert!(lines[12].starts_with("SN12,1.375,1,J1,"), "{}", lines[12]);
         assert_eq!(study.truth.to_csv().lines().count(), 101);
         assert!(study.truth.to_json().contains("\"rough_band_factor\": 3.0"));

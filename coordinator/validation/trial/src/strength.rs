@@ -1,12 +1,12 @@
 //! Results of effects that were hidden alone, by their strength.
 
-use crate::measures::{alarmed, alone};
+use crate::measures::{LIKELY, SURE, alarmed, alone};
 use crate::rate::Rate;
 use crate::score::CaseScore;
 use serde::{Deserialize, Serialize};
 
 /// Limits between the classes of strength, as detectability `d'`.
-const LIMITS: [f64; 4] = [3.0, 5.0, 6.5, 10.0];
+const LIMITS: [f64; 4] = [3.0, LIKELY, SURE, 10.0];
 
 /// Results of the effects of one class of strength.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -32,9 +32,9 @@ pub(crate) fn strengths(scores: &[CaseScore]) -> Vec<StrengthRow> {
 }
 
 fn row(scores: &[CaseScore], from: Option<f64>, to: Option<f64>) -> StrengthRow {
-    let is_in = |length: Option<f64>| match (from, length) {
-        (Some(from), Some(length)) => length >= from && to.is_none_or(|to| length < to),
-        (from, length) => from.is_none() && length.is_none(),
+    let is_in = |detectability: Option<f64>| match (from, detectability) {
+        (Some(from), Some(value)) => value >= from && to.is_none_or(|to| value < to),
+        (from, value) => from.is_none() && value.is_none(),
     };
     let of = || alone(scores).filter(|(_, named)| is_in(named.detectability));
     StrengthRow {

@@ -120,8 +120,8 @@ fn worst(parts: &[(Making, &Measured)]) -> Option<Making> {
 
 fn kinds(scores: &[CaseScore], usual: Option<Usual>) -> Vec<KindRow> {
     let all = || {
-        let alone = scores.iter().filter(|score| score.hidden.len() == 1);
-        alone.filter_map(|score| Some((score, score.hidden.first()?)))
+        let single = scores.iter().filter(|score| score.hidden.len() == 1);
+        single.filter_map(|score| Some((score, score.hidden.first()?)))
     };
     let names: BTreeSet<&str> = all().map(|(_, named)| named.physics.as_str()).collect();
     let kind = |physics: &str| {

@@ -99,8 +99,10 @@ fn hypothesis(
             Some(Location { x_m: [from_m, to_m], sleepers })
         }
     };
+    let probability = probability(finding).min(most);
     Some(Hypothesis {
-        probability: probability(finding).min(most),
+        probability,
+        family_probability: probability,
         accepted: is_tested || kind.measuring_chain,
         ..seen(finding, kind, location)
     })

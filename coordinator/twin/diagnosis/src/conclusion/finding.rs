@@ -46,7 +46,10 @@ impl Evidence<'_> {
             }
         }
         let shown = seen(finding, kind, location.clone());
-        if share_with_fitted(shown, self.probability_max(), all) {
+        let accepted = &self.search.accepted;
+        let is_fitted =
+            |physics: &str| accepted.iter().any(|candidate| candidate.kind.physics == physics);
+        if share_with_fitted(shown, is_fitted, self.probability_max(), all) {
             return;
         }
         let sleepers = self.prepared.forward.section.sleepers;
@@ -78,12 +81,21 @@ impl Evidence<'_> {
 }
 
 /// If the model explains a defect of the rail by another kind than the passes show there, each method can be wrong:
-/// divides the probability, at most `most`, between the two kinds. Returns whether it did.
-fn share_with_fitted(shown: Hypothesis, most: f64, all: &mut Vec<Hypothesis>) -> bool {
+/// divides the probability of both, at most `most`, between the two kinds. Returns whether it did. `is_fitted` tells
+/// of a kind whether the model contains it.
+fn share_with_fitted(
+    shown: Hypothesis,
+    is_fitted: impl Fn(&str) -> bool,
+    most: f64,
+    all: &mut Vec<Hypothesis>,
+) -> bool {
     let group = |known: &Hypothesis| Kind::from_name(&known.physics).map(|it| it.group);
     let is_there = |known: &Hypothesis| meet(known.location.as_ref(), shown.location.as_ref());
-    let is_fitted = |known: &&mut Hypothesis| {
+    let is_alternative =
+        |known: &Hypothesis| !known.accepted && known.physics == shown.physics && is_there(known);
+    let explains_it = |known: &&mut Hypothesis| {
         known.accepted
+            && is_fitted(&known.physics)
             && known.physics != shown.physics
             && group(known) == Some(LookAlikeGroup::RailDefect)
             && is_there(known)
@@ -91,10 +103,12 @@ fn share_with_fitted(shown: Hypothesis, most: f64, all: &mut Vec<Hypothesis>) ->
     if group(&shown) != Some(LookAlikeGroup::RailDefect) {
         return false;
     }
-    let Some(fitted) = all.iter_mut().find(is_fitted) else { return false };
-    let whole = fitted.probability.min(most);
+    let before: f64 =
+        all.iter().filter(|it| is_alternative(it)).map(|known| known.probability).sum();
+    let Some(fitted) = all.iter_mut().find(explains_it) else { return false };
+    let whole = (fitted.probability + before).min(most);
     fitted.probability = NAMED_SHARE * whole;
-    all.retain(|known| known.accepted || known.physics != shown.physics || !is_there(known));
+    all.retain(|known| !is_alternative(known));
     all.push(Hypothesis { probability: (1.0 - NAMED_SHARE) * whole, accepted: false, ..shown });
     true
 }
@@ -167,8 +181,8 @@ pub(super) fn probability(finding: &Finding) -> f64 {
     probability_of(finding.p_value)
 }
 
-/// Probability of what a test found. The evidence of a p-value is at most `1 / (-e p ln p)` times that of chance
-/// (Sellke, Bayarri & Berger 2001, The American Statistician 55).
+/// Probability of what a test found, an upper limit: the evidence of a p-value is at most `1 / (-e p ln p)` times that
+/// of chance (Sellke, Bayarri & Berger 2001, The American Statistician 55).
 pub(super) fn probability_of(p_value: f64) -> f64 {
     let p_value = p_value.clamp(P_MIN, (-1_f64).exp());
     let odds = ODDS_BEFORE / (-std::f64::consts::E * p_value * p_value.ln());
@@ -218,12 +232,19 @@ mod tests {
         };
         let shown = |ids| Hypothesis::accepted("rail_joint", Some(at(ids)));
         let mut all = vec![fitted];
-        assert!(!share_with_fitted(shown(["SN20", "SN21"]), 0.97, &mut all));
-        assert!(share_with_fitted(shown(["SN12", "SN13"]), 0.97, &mut all));
-        let [squat, joint] = &all[..] else { panic!("{all:?}") };
-        assert!(squat.accepted && !joint.accepted);
-        assert!((squat.probability - 0.6305).abs() < 1e-9, "{}", squat.probability);
-        assert!((joint.probability - 0.3395).abs() < 1e-9, "{}", joint.probability);
+        let share = |ids, fitted, all: &mut _| {
+            share_with_fitted(shown(ids), |physics| physics == fitted, 0.97, all)
+        };
+        assert!(!share(["SN20", "SN21"], "squat", &mut all));
+        assert!(!share(["SN12", "SN13"], "rail_joint", &mut all));
+        // A second finding of the same shape changes nothing.
+        for _ in 0..2 {
+            assert!(share(["SN12", "SN13"], "squat", &mut all));
+            let [squat, joint] = &all[..] else { panic!("{all:?}") };
+            assert!(squat.accepted && !joint.accepted);
+            assert!((squat.probability - 0.6305).abs() < 1e-9, "{}", squat.probability);
+            assert!((joint.probability - 0.3395).abs() < 1e-9, "{}", joint.probability);
+        }
     }
 
     #[test]

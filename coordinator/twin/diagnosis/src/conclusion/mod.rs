@@ -38,7 +38,7 @@ const MODEL_MAX: f64 = 0.97;
 /// hypotheses on recordings of a railway line, one had the correct location (docs/diagnosis-examples.md).
 const UNMEASURED_UNKNOWN_MAX: f64 = 0.5;
 
-/// Share of a group's probability that belongs to the kind which the inspection suggests.
+/// Share of a group's probability that belongs to the kind which the fit names or, without a fit, the inspection.
 const NAMED_SHARE: f64 = 0.65;
 
 /// Probability from which physics is accepted beside a fault of the measuring chain.
@@ -76,6 +76,8 @@ impl Evidence<'_> {
             let most = if hypothesis.physics == UNKNOWN { unknown_max } else { most };
             hypothesis.probability = hypothesis.probability.min(most);
         }
+        // Before a probability is divided among names.
+        let nothing_left_out = self.nothing(&hypotheses).min(most);
         let fitted: Vec<&str> =
             self.search.accepted.iter().map(|candidate| candidate.kind.physics).collect();
         add_siblings(&mut hypotheses, &fitted);
@@ -94,7 +96,6 @@ impl Evidence<'_> {
         let bias_removed = self.bias_removed(&hypotheses);
         let count = self.prepared.forward.section.sleepers;
         let sleepers: Vec<String> = (0..count).map(|sleeper| self.id(sleeper)).collect();
-        let nothing_left_out = self.nothing(&hypotheses).min(most);
         let said = sentence(verdict, &hypotheses, nothing_left_out, &sleepers, &fit, &bias_removed);
         let sentence = said + &airborne(self.inspection.loss_of_contact.as_ref());
         let notes = self.notes(&hypotheses);

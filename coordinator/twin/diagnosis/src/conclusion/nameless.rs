@@ -12,6 +12,9 @@ use tracktwin_track::extension::{Class, EffectFamily, Kind};
 /// Largest probability by chance of a patch that is reported.
 const PATCH_ALARM: f64 = 0.01;
 
+/// Standard deviation of the frequency or wavelength of a patch, relative: half the distance of two bands.
+const BAND_WIDTH: f64 = 0.06;
+
 impl Evidence<'_> {
     /// Adds a finding of a missing kind as unknown physics at its location, unless an extension other than
     /// a shape of rail or wheel was accepted. A shape of another kind at this location is rejected.
@@ -76,8 +79,7 @@ impl Evidence<'_> {
             Fixed::Wavelength(length_m) => ("wavelength_m", length_m),
             Fixed::Frequency(frequency_hz) => ("frequency_Hz", frequency_hz),
         };
-        // The bands' own width is what the place of a band is known to.
-        let estimate = Estimate { mean: parameters.1, sd: 0.06 * parameters.1 };
+        let estimate = Estimate { mean: parameters.1, sd: BAND_WIDTH * parameters.1 };
         all.retain(|known| known.physics != UNKNOWN);
         all.push(Hypothesis {
             physics: UNKNOWN.to_owned(),

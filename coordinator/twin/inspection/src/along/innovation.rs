@@ -4,14 +4,13 @@ use super::background::{faded_lines, median};
 use nalgebra::{DMatrix, DVector};
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex64;
+use tracktwin_number::NORMAL_QUARTILE;
 use tracktwin_signal::recording::Pass;
 
 /// Number of samples that predict the next one: four poles for each of ten resonances.
 const ORDER: usize = 40;
 /// Share of the power that is added as white noise, so that a silent band stays solvable.
 const FLOOR: f64 = 1e-9;
-/// Quartile of a normal distribution, in standard deviations.
-const QUARTILE: f64 = 0.6745;
 
 /// Innovations of a pass below a frequency.
 ///
@@ -51,7 +50,7 @@ impl Innovations {
 
     /// Usual size of an innovation, as a standard deviation.
     pub(crate) fn usual(&self) -> f64 {
-        median(self.values.iter().map(|value| value.abs()).collect()) / QUARTILE
+        median(self.values.iter().map(|value| value.abs()).collect()) / NORMAL_QUARTILE
     }
 
     /// Innovation at a position in m, interpolated; zero beyond the pass.

@@ -2,7 +2,7 @@
 //!
 //! Innovations are the response to a surface that is white. A shape of the surface therefore appears in them as
 //! the shape that the same filter makes white: its transform over the root of the surface's spectral density, with
-//! the minimum phase. Other than a ratio of spectra this keeps the phase, which concentrates a weak kink.
+//! the minimum phase. Unlike a ratio of spectra, this keeps the phase, which concentrates a weak kink.
 
 use super::shape::{Fitted, Form, Shape, most_likely};
 use crate::along::{Innovations, Surface};

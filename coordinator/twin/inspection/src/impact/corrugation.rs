@@ -265,7 +265,7 @@ impl CorrugationSearch<'_> {
         let first = levels.iter().position(loud).unwrap_or(0);
         let last = levels.iter().rposition(loud).unwrap_or(count - 1);
         let extent = [middles[first], middles[last]];
-        // Windows that are loud by themselves tell no length.
+        // A single loud window does not show the length.
         if extent[1] - extent[0] < half { best.stretch_m } else { extent }
     }
 }

@@ -8,6 +8,7 @@
 use super::coherent::coherent_shape;
 use super::shape::Shape;
 use crate::along::{Innovations, Surface, bonferroni, ln_normal_bound, speed_m_s};
+use tracktwin_number::NORMAL_QUARTILE;
 use tracktwin_signal::recording::{Pass, Recording};
 
 /// Highest wave number in cycles per sleeper spacing: waves of 10 mm on a line.
@@ -28,8 +29,6 @@ const EACH_PASS: f64 = 2.0;
 const LOUDEST: f64 = 8.0;
 /// Smallest distance of two kinks in sleeper spacings.
 const APART: f64 = 0.5;
-/// Quartile of a normal distribution, in standard deviations.
-const QUARTILE: f64 = 0.6745;
 
 /// A kink at one position of the track.
 #[derive(Clone, Debug)]
@@ -160,7 +159,7 @@ fn standardised(values: &[f64]) -> Vec<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let [low, middle, high] = [1, 2, 3].map(|quarter| sorted[(sorted.len() - 1) * quarter / 4]);
-    let deviation = ((high - low) / (2.0 * QUARTILE)).max(f64::MIN_POSITIVE);
+    let deviation = ((high - low) / (2.0 * NORMAL_QUARTILE)).max(f64::MIN_POSITIVE);
     values.iter().map(|value| (value - middle) / deviation).collect()
 }
 

@@ -2,6 +2,7 @@
 
 use crate::along::{Background, Energy, by_speed, ln_gamma_tail, median, speed_m_s, whitened};
 use std::ops::Range;
+use tracktwin_number::NORMAL_QUARTILE;
 use tracktwin_signal::recording::{Pass, Recording};
 
 /// Frequency range of a blow in Hz. In this range the power of the surface itself varies little along the
@@ -28,8 +29,6 @@ const PRODUCT_MIN: f64 = 6.0;
 const STEPS: usize = 2;
 /// Distance on either side, in sleeper spacings, over which the normal power of a cell is determined.
 const NEAR_SPACINGS: f64 = 1.5;
-/// Distance between the quartiles of a normal distribution, in standard deviations.
-const QUARTILES: f64 = 1.349;
 
 /// Kind of impact in a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -186,6 +185,6 @@ fn shape(ratio: &[f64]) -> Option<f64> {
     let mut logs: Vec<f64> = ratio.iter().map(|value| value.max(1e-12).ln()).collect();
     logs.sort_by(f64::total_cmp);
     let quartile = |quarters: usize| logs[(logs.len() - 1) * quarters / 4];
-    let deviation = (quartile(3) - quartile(1)) / QUARTILES;
+    let deviation = (quartile(3) - quartile(1)) / (2.0 * NORMAL_QUARTILE);
     (deviation > 0.0).then(|| 0.5 + 1.0 / deviation.powi(2))
 }

@@ -3,6 +3,7 @@
 use super::block::{Block, CombBlock, SHIFTS, shifts};
 use super::order_model::{HeldOut, held_out};
 use crate::along::{ln_binomial_tail, median};
+use tracktwin_number::NORMAL_QUARTILE;
 use tracktwin_signal::recording::Pass;
 
 /// Smallest and largest circumference of railway wheels in m, from trams to locomotives.
@@ -65,7 +66,7 @@ pub fn comb(pass: &Pass, alpha: f64) -> Option<Comb> {
     turns.sort_by(f64::total_cmp);
     let middle = turns[count / 2];
     // Half of the middle half: unmoved by blocks where something louder passes.
-    let deviation = 0.5 * (turns[3 * count / 4] - turns[count / 4]) / 0.6745;
+    let deviation = 0.5 * (turns[3 * count / 4] - turns[count / 4]) / NORMAL_QUARTILE;
     let held_out = held_out(&blocks, &fitted, band_hz);
     Some(Comb {
         circumference_m: (middle, deviation.max(STEP * middle)),
