@@ -95,16 +95,12 @@ fn keep_probable(unknowns: &mut Unknowns, data: &Quadratic) -> Vec<f64> {
         let count = unknowns.support_changes.len();
         let all: Vec<f64> = (0..count).map(|index| log_odds(unknowns, index, data)).collect();
         let least = (0..count).min_by(|&one, &other| all[one].total_cmp(&all[other]));
-        match least.filter(|&index| all[index] <= 0.0) {
-            Some(index) => {
-                unknowns.support_changes.remove(index);
-                vary(unknowns, data);
-            }
-            None => {
-                let probability = |log_odds: f64| 1.0 / (1.0 + (-log_odds).exp());
-                return all.into_iter().map(|it| probability(it).min(PROBABILITY_MAX)).collect();
-            }
-        }
+        let Some(index) = least.filter(|&index| all[index] <= 0.0) else {
+            let probability = |log_odds: f64| 1.0 / (1.0 + (-log_odds).exp());
+            return all.into_iter().map(|it| probability(it).min(PROBABILITY_MAX)).collect();
+        };
+        unknowns.support_changes.remove(index);
+        vary(unknowns, data);
     }
 }
 
