@@ -89,7 +89,7 @@ pub async fn diagnose(
     let mut inspection = compute(|| inspect(recording));
     let cleared = compute(|| inspection.without_hum(recording));
     let mut prepared =
-        match compute(|| PreparedRecording::new(&cleared, track, &inspection.misplaced)) {
+        match compute(|| PreparedRecording::new(&cleared, track, &inspection.not_compared())) {
             Ok(prepared) => prepared,
             Err(reason) => {
                 inspection.forget(allowed);

@@ -50,10 +50,10 @@ pub async fn invert(
 ) -> Result<Inversion, InvertingError> {
     watch("spectra", 0.0);
     let inspection = compute(|| inspect(recording));
-    let left_out = inspection.misplaced_note(recording);
+    let left_out = inspection.notes_on_not_compared(recording);
     let all_passes = recording.passes.len();
     let recording = &*inspection.without_hum(recording);
-    let recording = &inspection.placed(recording);
+    let recording = &inspection.comparable(recording);
     let prepared = compute(|| sections(recording, track))?;
     let with_physics = |prepared: PreparedRecording| {
         let known = diagnosis.map(|diagnosis| accepted(diagnosis, recording, &prepared));

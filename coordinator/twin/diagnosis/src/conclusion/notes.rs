@@ -14,7 +14,7 @@ impl Evidence<'_> {
     pub(super) fn notes(&self, hypotheses: &[Hypothesis]) -> Vec<String> {
         let mut notes: Vec<String> =
             self.inspection.pass_defects.iter().map(ToString::to_string).collect();
-        notes.extend(self.inspection.misplaced_note(self.recording));
+        notes.extend(self.inspection.notes_on_not_compared(self.recording));
         if self.speeds() == 1 {
             notes.push(one_speed(3.6 * self.prepared.forward.speeds_m_s[0]));
         }

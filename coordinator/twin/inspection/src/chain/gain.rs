@@ -63,6 +63,30 @@ pub fn gains(recording: &Recording) -> Vec<Gain> {
     gains
 }
 
+/// The passes whose gain is wrong: both of two, because none tells which it is, and of more the one that differs most
+/// with those that differ half as much.
+pub(crate) fn of_other_gain(
+    recording: &Recording,
+    gains: &[Gain],
+    is_error: impl Fn(&Gain) -> bool,
+) -> Vec<usize> {
+    let of_group = |group: Vec<usize>| {
+        let errors = gains.iter().filter(|gain| group.contains(&gain.pass) && is_error(gain));
+        let errors: Vec<&Gain> = errors.collect();
+        let largest = errors.iter().map(|gain| gain.gain_db.0.abs()).fold(0.0, f64::max);
+        let passes: Vec<usize> = match (errors.is_empty(), group.len()) {
+            (true, _) => Vec::new(),
+            (false, 2) => group,
+            (false, _) => {
+                let is_far = |gain: &&&Gain| gain.gain_db.0.abs() > 0.5 * largest;
+                errors.iter().filter(is_far).map(|gain| gain.pass).collect()
+            }
+        };
+        passes
+    };
+    by_speed(&recording.passes).into_iter().flat_map(of_group).collect()
+}
+
 fn of_speed(recording: &Recording, group: &[usize]) -> Vec<Gain> {
     let passes: Vec<&Pass> = group.iter().map(|&index| &recording.passes[index]).collect();
     let Some(background) = Background::of(&passes[0].signal) else { return Vec::new() };

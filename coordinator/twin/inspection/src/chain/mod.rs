@@ -19,6 +19,7 @@ mod usable;
 pub use clipping::{Clipping, clipping};
 pub(crate) use contact::expected_m_s2;
 pub use contact::{LossOfContact, PassLoss, loss_of_contact};
+pub(crate) use gain::of_other_gain;
 pub use gain::{Gain, gains};
 pub use hum::{Hum, hum, without_hum};
 pub(crate) use offset::misplaced;

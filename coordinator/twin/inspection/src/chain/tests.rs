@@ -178,6 +178,22 @@ fn a_pass_with_another_gain_is_told_from_one_with_another_spectrum() {
     // 1.15 is 1.21 dB; the noise of the sensor is a two hundredth of the signal's power.
     assert!((found[1].gain_db.0 - 1.21).abs() < 0.1 && found[1].is_error(ALPHA), "{found:?}");
     assert!(!found[2].is_error(ALPHA));
+    let wrong =
+        |recording, gains: &[Gain]| of_other_gain(recording, gains, |gain| gain.is_error(ALPHA));
+    // None tells which of two passes is wrong; of four it is the one that differs from all others.
+    assert_eq!(wrong(&louder, &found), [0, 1]);
+    let mut at_one_speed = louder.clone();
+    at_one_speed.passes.truncate(4);
+    at_one_speed.passes.iter_mut().for_each(|pass| pass.speed_km_h = 13.0);
+    let of = |pass: usize, gain_db: f64| Gain {
+        pass,
+        gain_db: (gain_db, 0.05),
+        spread_db: 0.1,
+        ln_p: -20.0,
+        ..found[1].clone()
+    };
+    let by_hand = [of(0, -0.4), of(1, 1.21), of(2, -0.4), of(3, -0.4)];
+    assert_eq!(wrong(&at_one_speed, &by_hand), [1]);
     let rumble = measured(3, &|pass, samples, _| {
         if pass == 1 {
             let tone = |index: usize| (TAU * 200.0 * index as f64 / Rolled::RATE_HZ).sin();

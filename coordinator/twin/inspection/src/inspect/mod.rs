@@ -53,6 +53,9 @@ pub struct Inspection {
     /// Passes that cannot be compared with a track, because their positions differ from those of another pass
     /// at their speed. Empty if fewer than two speeds would be left.
     pub misplaced: Vec<usize>,
+    /// Passes that cannot be compared with a track, because their gain differs from that of another pass at their
+    /// speed. Empty if fewer than two speeds would be left.
+    pub of_other_gain: Vec<usize>,
     /// The comb of wheel orders for a wheel of unknown circumference, from the first pass with a comb.
     pub comb: Option<Comb>,
 }
@@ -79,24 +82,35 @@ impl Inspection {
         }
     }
 
-    /// The recording without its misplaced passes.
-    pub fn placed(&self, recording: &Recording) -> Recording {
-        let passes = recording.passes.iter().enumerate();
-        let placed = passes.filter(|(pass, _)| !self.misplaced.contains(pass));
-        Recording { passes: placed.map(|(_, pass)| pass.clone()).collect(), ..recording.clone() }
+    /// Passes that cannot be compared with a track.
+    pub fn not_compared(&self) -> Vec<usize> {
+        [&self.misplaced[..], &self.of_other_gain].concat()
     }
 
-    /// A note on the passes that are not compared with the track because of their positions.
-    pub fn misplaced_note(&self, recording: &Recording) -> Option<String> {
+    /// The recording without the passes that cannot be compared with a track.
+    pub fn comparable(&self, recording: &Recording) -> Recording {
+        let not_compared = self.not_compared();
+        let passes = recording.passes.iter().enumerate();
+        let passes = passes.filter(|(pass, _)| !not_compared.contains(pass));
+        Recording { passes: passes.map(|(_, pass)| pass.clone()).collect(), ..recording.clone() }
+    }
+
+    /// Notes on the passes that are not compared with the track.
+    pub fn notes_on_not_compared(&self, recording: &Recording) -> Vec<String> {
         let file = |&pass: &usize| &*recording.passes[pass].file;
-        let files: Vec<&str> = self.misplaced.iter().map(file).collect();
-        (!files.is_empty()).then(|| {
-            format!(
-                "{}: not compared with the track, because their positions differ from those of another \
-                     pass at the same speed.",
-                files.join(", ")
-            )
-        })
+        let note = |(passes, differs): (&Vec<usize>, &str)| {
+            let files: Vec<&str> = passes.iter().map(file).collect();
+            (!files.is_empty()).then(|| {
+                format!(
+                    "{}: not compared with the track, because their {differs} of another pass at the same \
+                     speed.",
+                    files.join(", ")
+                )
+            })
+        };
+        let of_position = (&self.misplaced, "positions differ from those");
+        let of_gain = (&self.of_other_gain, "gain differs from that");
+        [of_position, of_gain].into_iter().filter_map(note).collect()
     }
 
     /// The defect that makes the whole recording unusable, if any: a pass without a signal, or passes that
@@ -150,6 +164,12 @@ pub fn inspect(recording: &Recording) -> Inspection {
     findings.extend(offsets.iter().filter(|pair| is_error(pair)).map(offset_finding));
     let misplaced = chain::misplaced(&offsets, is_error);
     let misplaced = if leaves_speeds(recording, &misplaced) { misplaced } else { Vec::new() };
+    let mut of_other_gain =
+        chain::of_other_gain(recording, &gains, |gain| gain.is_error(EACH_TEST));
+    of_other_gain.retain(|pass| !misplaced.contains(pass));
+    if !leaves_speeds(recording, &[&misplaced[..], &of_other_gain].concat()) {
+        of_other_gain.clear();
+    }
     findings.extend(on_surface);
     let loss_of_contact = chain::loss_of_contact(recording);
     if let Some(lost) = &loss_of_contact {
@@ -166,6 +186,7 @@ pub fn inspect(recording: &Recording) -> Inspection {
         gains,
         offsets,
         misplaced,
+        of_other_gain,
         comb,
     }
 }
