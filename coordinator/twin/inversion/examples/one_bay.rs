@@ -34,10 +34,10 @@ const STEP: usize = 12;
 /// The filter: a windowed sinc of this cut-off in Hz, with this number of samples on either side of the middle.
 const CUT_OFF_HZ: f64 = 3900.0;
 const HALF_FILTER: usize = 60;
-/// Spectral lines of the covariance: distance and end in Hz. What the filter leaves above half the sample rate is
+/// Spectral lines of the covariance, up to 6.5 kHz: distance in Hz and number. What the filter leaves above half the sample rate is
 /// aliased in model and signal alike.
 const LINE_HZ: f64 = 14.4;
-const LAST_HZ: f64 = 6500.0;
+const LINES: u32 = 451;
 /// Number of levels on which the posterior is evaluated, at the middles of equal parts of the range.
 const LEVELS: usize = 41;
 /// Standard deviations of the sensor's white noise in m/s2, known to the observer.
@@ -101,8 +101,7 @@ impl Bay {
         let basis =
             signals_in_band((spacing_m / speed_m_s() / sample_s).floor() as usize, sample_s)?;
         let filter = low_pass(step_s);
-        let lines_hz: Vec<f64> =
-            (1..).map(|line| f64::from(line) * LINE_HZ).take_while(|hz| *hz < LAST_HZ).collect();
+        let lines_hz: Vec<f64> = (1..=LINES).map(|line| f64::from(line) * LINE_HZ).collect();
 
         let sleeper_m = (SPANS / 2) as f64 * spacing_m;
         let all_m = model.layout().rail_nodes_m();
@@ -280,6 +279,36 @@ fn scores(
     (0..truth.len()).map(score).collect()
 }
 
+/// Errors of all parameters over the cases. Arguments of the log likelihood: track, level, case.
+fn table_row(
+    log_likelihood: impl Fn(usize, usize, usize) -> f64 + Sync,
+    bank: &[Vec<f64>],
+    levels: &[f64],
+    cases: &[Vec<f64>],
+) -> String {
+    let score = |case: usize| {
+        let all = (0..bank.len()).flat_map(|track| (0..LEVELS).map(move |level| (track, level)));
+        let highest = all
+            .map(|(track, level)| log_likelihood(track, level, case))
+            .fold(f64::NEG_INFINITY, f64::max);
+        let weight = |track, level| (log_likelihood(track, level, case) - highest).exp();
+        let of_track = |track: usize| (0..LEVELS).map(|level| weight(track, level)).collect();
+        let weights: Vec<Vec<f64>> = (0..bank.len()).map(of_track).collect();
+        scores(&weights, bank, levels, &cases[case])
+    };
+    let scores: Vec<Vec<(f64, bool)>> = (0..cases.len()).into_par_iter().map(score).collect();
+    let count = scores.len() as f64;
+    let column = |(place, parameter): (usize, &Parameter)| {
+        let mean = scores.iter().map(|case| case[place].0).sum::<f64>() / count;
+        let square = scores.iter().map(|case| (case[place].0 - mean).powi(2)).sum::<f64>();
+        let held = scores.iter().filter(|case| case[place].1).count() as f64 / count;
+        let [mean, error, held] = [mean, square.sqrt() / count, held].map(|share| 100.0 * share);
+        format!("{} {mean:.1} ± {error:.1} ({held:.0} %)", parameter.symbol())
+    };
+    let columns: Vec<String> = Parameter::ALL.iter().enumerate().map(column).collect();
+    columns.join(", ")
+}
+
 fn main() -> Result<(), Failure> {
     faer::set_global_parallelism(Par::Seq);
     let number = |place: usize, usual: u32| -> Result<u32, Failure> {
@@ -322,33 +351,9 @@ fn main() -> Result<(), Failure> {
         "noise, then mean absolute error in % of the range ± standard error (share of truths in the 90 % intervals)"
     );
     for (number, noise) in NOISES.iter().enumerate() {
-        let score = |case: usize| {
-            let at = |track: usize, level: usize| likelihoods[track][number][level][case];
-            let all =
-                (0..bank.len()).flat_map(|track| (0..LEVELS).map(move |level| (track, level)));
-            let highest = all.map(|(track, level)| at(track, level)).fold(f64::MIN, f64::max);
-            let weights: Vec<Vec<f64>> = (0..bank.len())
-                .map(|track| (0..LEVELS).map(|level| (at(track, level) - highest).exp()).collect())
-                .collect();
-            scores(&weights, &bank, &shares, &cases[case])
-        };
-        let scores: Vec<Vec<(f64, bool)>> = (0..cases.len()).into_par_iter().map(score).collect();
-        let count = scores.len() as f64;
-        let column = |(place, parameter): (usize, &Parameter)| {
-            let mean = scores.iter().map(|case| case[place].0).sum::<f64>() / count;
-            let square = scores.iter().map(|case| (case[place].0 - mean).powi(2)).sum::<f64>();
-            let held = scores.iter().filter(|case| case[place].1).count() as f64 / count;
-            let error = square.sqrt() / count;
-            format!(
-                "{} {:.1} ± {:.1} ({:.0} %)",
-                parameter.symbol(),
-                100.0 * mean,
-                100.0 * error,
-                100.0 * held
-            )
-        };
-        let columns: Vec<String> = Parameter::ALL.iter().enumerate().map(column).collect();
-        println!("{noise} m/s2: {}", columns.join(", "));
+        let log_likelihood =
+            |track: usize, level: usize, case: usize| likelihoods[track][number][level][case];
+        println!("{noise} m/s2: {}", table_row(log_likelihood, &bank, &shares, &cases));
     }
     Ok(())
 }
