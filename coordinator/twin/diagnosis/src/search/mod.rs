@@ -80,6 +80,8 @@ pub struct Fitted {
 pub struct Round {
     /// Probability of the greatest evidence if nothing is left out.
     pub p_value: f64,
+    /// Whether the track is not V-Track.
+    pub on_line: bool,
     /// Share of the catalogue that would not be detected in this recording.
     pub unseen: f64,
     /// Fitted candidates, the best first.
