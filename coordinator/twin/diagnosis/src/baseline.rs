@@ -272,13 +272,10 @@ impl Unknowns {
     /// Inverse of the prior covariance, with exceptions and support changes.
     pub fn precision(&self) -> DMatrix<f64> {
         let mut covariance = self.covariance();
-        for &change in &self.support_changes {
-            let direction = self.along_change(change);
+        let changes = self.support_changes.iter().map(|&change| self.along_change(change));
+        let exceptions = self.exceptions.iter().map(|&exception| self.along_exception(exception));
+        for direction in changes.chain(exceptions) {
             covariance.ger(1.0, &direction, &direction, 1.0);
-        }
-        for &Exception { field, sleeper } in &self.exceptions {
-            let index = self.at(field, sleeper);
-            covariance[(index, index)] += prior::EXCEPTION.powi(2);
         }
         Cholesky::new(covariance).expect("a prior with a white part is positive definite").inverse()
     }

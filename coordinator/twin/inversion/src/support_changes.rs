@@ -163,7 +163,7 @@ mod tests {
         assert_eq!(change.sentence(), expected);
     }
 
-    /// Changes that the sections 0..26 and 18..44 found, and the number of stated ones of each form.
+    /// Those of the changes found in the sections 0..26 and 18..44 that are stated.
     fn stated(found: &[(usize, SupportChange)]) -> Vec<SupportChange> {
         let amplitude = Amplitude { log: 0.5, deviation: 0.1, probability: 0.9 };
         let all = found.iter().map(|&(section, change)| Found { section, change, amplitude });

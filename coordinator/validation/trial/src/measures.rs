@@ -274,7 +274,8 @@ fn bias(scores: &[CaseScore]) -> Measured {
 fn cost(scores: &[CaseScore]) -> Measured {
     let seconds: Vec<f64> = scores.iter().map(|score| score.cpu_s).collect();
     let most = seconds.iter().copied().max_by(f64::total_cmp);
-    let value = match (median(seconds.clone()), most) {
+    let median = median(seconds);
+    let value = match (median, most) {
         (Some(median), Some(most)) => format!("median {median:.0} s, most {most:.0} s"),
         _ => "none".to_owned(),
     };
@@ -282,8 +283,8 @@ fn cost(scores: &[CaseScore]) -> Measured {
         measure: "CPU time of a diagnosis",
         value,
         goal: Some("median 60 s".to_owned()),
-        reached: median(seconds).map(|median| median <= 60.0),
-        badness: most,
+        reached: median.map(|median| median <= 60.0),
+        badness: median,
         of: scores.len() as u64,
     }
 }

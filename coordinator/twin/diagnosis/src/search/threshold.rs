@@ -21,8 +21,8 @@ const NEAR_SHAPE_SHARE_MIN: f64 = 1.0;
 const FURTHER_MIN: f64 = 30.0;
 
 /// Smallest log evidence of a first candidate in nats, on a track other than V-Track. On a control of another
-/// simulator a crack that did not exist had 9.6 nats and predicted the held-out speeds; the effects that were named
-/// rightly on lines had 40 and more.
+/// simulator a crack that did not exist had 9.6 nats and predicted the held-out speeds; the weakest effect that was
+/// named rightly on a line had 16.
 const FIRST_MIN: f64 = 15.0;
 
 /// Smallest log evidence in nats, on a track other than V-Track, of a defect at a point of the rail that the
