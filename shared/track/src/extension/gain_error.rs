@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {
     physics: "gain_error",
-    summary: "all accelerations are recorded too large or too small by one factor",
+    summary: "accelerations are recorded too large or too small by one factor",
     family: EffectFamily::Sensor,
     group: LookAlikeGroup::MeasuringChain,
     classes: &[Class::Frequency, Class::Global],

@@ -76,6 +76,15 @@ impl Ruler {
     pub(crate) const BOTH: [Self; 2] = [Self::Odometer, Self::Clock];
 }
 
+/// Index of a position in m among positions that do not decrease, interpolated or extrapolated.
+pub(crate) fn index_at(positions_m: &[f64], x_m: f64) -> f64 {
+    let last = positions_m.len() - 1;
+    let after = positions_m.partition_point(|&place| place <= x_m).clamp(1, last);
+    let (low, high) = (positions_m[after - 1], positions_m[after]);
+    let part = if high > low { (x_m - low) / (high - low) } else { 0.0 };
+    (after - 1) as f64 + part
+}
+
 /// Values of a pass at `points` equidistant positions from `from_m` (included) to `to_m` (excluded), in m.
 pub(crate) fn on_even_places(
     pass: &Pass,
@@ -87,18 +96,13 @@ pub(crate) fn on_even_places(
     let positions = &pass.position_m;
     let last = positions.len() - 1;
     let per_sample = (positions[last] - positions[0]) / last as f64;
-    let index_at = |x: f64| match ruler {
+    let index_of = |x: f64| match ruler {
         Ruler::Clock => (x - positions[0]) / per_sample,
-        Ruler::Odometer => {
-            let after = positions.partition_point(|&place| place <= x).clamp(1, last);
-            let (low, high) = (positions[after - 1], positions[after]);
-            let part = if high > low { (x - low) / (high - low) } else { 0.0 };
-            (after - 1) as f64 + part
-        }
+        Ruler::Odometer => index_at(positions, x),
     };
     let step = (to_m - from_m) / points as f64;
     let value = |point: usize| {
-        let index = index_at(from_m + point as f64 * step).clamp(0.0, last as f64);
+        let index = index_of(from_m + point as f64 * step).clamp(0.0, last as f64);
         let low = (index.floor() as usize).min(last.saturating_sub(1));
         let part = index - low as f64;
         values[low] * (1.0 - part) + values[low + 1] * part

@@ -1,6 +1,9 @@
 //! Mains hum: lines with the same frequency at all speeds, narrower than any structural resonance.
+//!
+//! Two passes of one speed share the surface and the track but not the phase of the mains. So a line is searched in
+//! their difference, too, where less is beside it.
 
-use crate::along::{Line, Spectrum, bonferroni, by_speed, ln_gamma_tail, speed_m_s};
+use crate::along::{Line, Spectrum, bonferroni, by_speed, index_at, ln_gamma_tail, speed_m_s};
 use rustfft::num_complex::Complex64;
 use std::f64::consts::TAU;
 use tracktwin_signal::Signal;
@@ -26,7 +29,7 @@ const SEGMENTS_MIN: usize = 4;
 const WAVES_MIN: f64 = 10.0;
 /// Distance of the nearer neighbours in resolution cells, relative to which a line must be significant too.
 /// The flanks of a lightly damped resonance are no background.
-const NEAR: f64 = 6.0;
+const NEAR: f64 = 8.0;
 /// A line within this number of resolution cells of a sleeper or wheel harmonic may belong to it.
 const CELLS_APART: f64 = 1.5;
 
@@ -37,7 +40,7 @@ pub struct Hum {
     pub frequency_hz: f64,
     /// Amplitude in m/s2, as mean of all passes, and its standard deviation.
     pub amplitude_m_s2: (f64, f64),
-    /// Power relative to the neighbours, as mean of all speeds.
+    /// Power relative to the neighbours, as mean of all speeds; in the passes or in their differences.
     pub ratio: f64,
     /// Natural logarithm of the probability of such a line at any mains frequency without hum.
     pub ln_p: f64,
@@ -50,11 +53,8 @@ pub struct Hum {
 /// lines.
 pub fn hum(recording: &Recording, turn_m: Option<f64>, alpha: f64) -> Vec<Hum> {
     let lengths_m: Vec<f64> = turn_m.into_iter().chain([recording.spacing_m]).collect();
-    let spectra_of = |group: Vec<usize>| {
-        group.into_iter().map(|index| PassSpectra::of(&recording.passes[index])).collect()
-    };
-    let speeds: Vec<Vec<PassSpectra>> =
-        by_speed(&recording.passes).into_iter().map(spectra_of).collect();
+    let groups = by_speed(&recording.passes).into_iter();
+    let speeds: Vec<Speed> = groups.map(|group| Speed::of(recording, &group)).collect();
     let mut found = Vec::new();
     let mut tries = 0;
     for (mains, harmonics) in MAINS_HZ {
@@ -116,39 +116,40 @@ fn subtract_tone(samples: &mut [f64], frequency_hz: f64, rate_hz: f64) {
 }
 
 /// The line nearest to a mains frequency, and the number of tested bins.
-fn line(speeds: &[Vec<PassSpectra>], lengths_m: &[f64], frequency: f64) -> (Option<Hum>, usize) {
-    let mut tries = 0;
-    let (mut each, mut ratios) = (Vec::new(), Vec::new());
-    let (mut amplitudes, mut by_speed) = (Vec::new(), Vec::new());
-    for passes in speeds {
-        let lines: Option<Vec<Tone>> = passes.iter().map(|pass| pass.line(frequency)).collect();
-        let Some(lines) = lines else { return (None, 0) };
-        tries = lines.iter().map(|line| line.tries).fold(tries, usize::max);
-        let mean = |of: fn(&Tone) -> f64| lines.iter().map(of).sum::<f64>() / lines.len() as f64;
-        ratios.push(mean(|line| line.ratio));
-        amplitudes.extend(lines.iter().map(|line| line.amplitude));
-        // Where it may be the sleepers' or the blows' a line says nothing either way.
-        let may_be_of =
-            |&length_m: &f64| passes.iter().any(|pass| pass.may_be_of(frequency, length_m));
-        if !lengths_m.iter().any(may_be_of) {
-            each.push(mean(|line| line.ln_p));
-            by_speed.push(mean(|line| line.amplitude));
-        }
-    }
-    let detected = each.iter().filter(|ln_p| **ln_p <= EACH_SPEED.ln()).count();
-    if each.is_empty() || detected < SPEEDS_MIN.min(each.len()) || !are_alike(&by_speed) {
+fn line(speeds: &[Speed], lengths_m: &[f64], frequency: f64) -> (Option<Hum>, usize) {
+    let lines: Option<Vec<_>> = speeds.iter().map(|speed| speed.line(frequency)).collect();
+    let Some(lines) = lines else { return (None, 0) };
+    let tries = lines.iter().map(|line| line.tries).fold(0, usize::max);
+    // Where it may be the sleepers' or the blows' a line says nothing either way.
+    let may_be_of = |speed: &Speed| lengths_m.iter().any(|&it| speed.may_be_of(frequency, it));
+    let own = speeds.iter().zip(&lines).filter(|(speed, _)| !may_be_of(speed));
+    let own: Vec<&SpeedLine> = own.map(|(_, line)| line).collect();
+    let detected = own.iter().filter(|line| line.ln_p <= EACH_SPEED.ln()).count();
+    if own.is_empty() || detected < SPEEDS_MIN.min(own.len()) || !are_alike(&own) {
         return (None, tries);
     }
-    let count = amplitudes.len() as f64;
-    let mean = amplitudes.iter().sum::<f64>() / count;
-    let square = amplitudes.iter().map(|a| (a - mean).powi(2)).sum::<f64>() / count;
+    let passes: Vec<&Tone> = lines.iter().flat_map(|line| &line.passes).collect();
+    let each: Vec<f64> = own.iter().map(|line| line.ln_p).collect();
     let hum = Hum {
         frequency_hz: frequency,
-        amplitude_m_s2: (mean, square.sqrt().max(0.05 * mean)),
-        ratio: ratios.iter().sum::<f64>() / ratios.len() as f64,
+        amplitude_m_s2: amplitude(&passes),
+        ratio: lines.iter().map(|line| line.ratio).sum::<f64>() / lines.len() as f64,
         ln_p: of_all(&each),
     };
     (Some(hum), tries)
+}
+
+/// Mean amplitude and its standard deviation. The background adds to the line in every pass; passes count
+/// by the inverse power of theirs.
+fn amplitude(passes: &[&Tone]) -> (f64, f64) {
+    let weights = || passes.iter().map(|tone| tone.ratio / tone.amplitude.powi(2));
+    let mean_of = |of: &dyn Fn(&Tone) -> f64| {
+        passes.iter().zip(weights()).map(|(tone, weight)| weight * of(tone)).sum::<f64>()
+            / weights().sum::<f64>()
+    };
+    let mean = mean_of(&|tone| tone.amplitude);
+    let square = mean_of(&|tone| (tone.amplitude - mean).powi(2));
+    (mean, square.sqrt().max(0.05 * mean))
 }
 
 /// Combines the probabilities of all speeds (Fisher). They are independent, because a fixed frequency
@@ -158,11 +159,97 @@ fn of_all(ln_probabilities: &[f64]) -> f64 {
     ln_gamma_tail(count, -ln_probabilities.iter().sum::<f64>() / count)
 }
 
-/// Whether the amplitudes may belong to one line.
-fn are_alike(amplitudes: &[f64]) -> bool {
-    let [least, most] =
-        amplitudes.iter().fold([f64::MAX, 0.0], |[l, m]: [f64; 2], &a| [l.min(a), m.max(a)]);
-    most <= APART_MAX * least
+/// Whether the lines of all speeds may be one.
+fn are_alike(lines: &[&SpeedLine]) -> bool {
+    let least = lines.iter().map(|line| line.amplitude[1]).fold(f64::MAX, f64::min);
+    lines.iter().all(|line| line.amplitude[0] <= APART_MAX * least)
+}
+
+/// All passes of one speed.
+struct Speed {
+    passes: Vec<PassSpectra>,
+    /// What each pass has beside the mean of the others at the same positions: the surface and the track
+    /// cancel, the mains do not. Empty for a single pass.
+    differences: Vec<PassSpectra>,
+}
+
+/// Line at one speed.
+struct SpeedLine {
+    passes: Vec<Tone>,
+    /// Mean ratio in the passes or in the differences, where the line is more significant.
+    ratio: f64,
+    /// Least and largest amplitude of the mains in m/s2.
+    amplitude: [f64; 2],
+    ln_p: f64,
+    tries: usize,
+}
+
+impl Speed {
+    fn of(recording: &Recording, group: &[usize]) -> Self {
+        let pass = |index: usize| &recording.passes[index];
+        let differences = group.iter().filter_map(|&index| {
+            let others = group.iter().filter(|&&other| other != index).map(|&other| pass(other));
+            difference(pass(index), &others.collect::<Vec<_>>())
+        });
+        Self {
+            passes: group
+                .iter()
+                .map(|&index| PassSpectra::new(pass(index).signal.samples(), pass(index)))
+                .collect(),
+            differences: differences.collect(),
+        }
+    }
+
+    fn may_be_of(&self, frequency: f64, length_m: f64) -> bool {
+        self.passes.iter().any(|pass| pass.may_be_of(frequency, length_m))
+    }
+
+    fn line(&self, frequency: f64) -> Option<SpeedLine> {
+        let tones = |passes: &[PassSpectra]| -> Option<Vec<Tone>> {
+            passes.iter().map(|pass| pass.line(frequency)).collect()
+        };
+        let passes = tones(&self.passes)?;
+        let differences = tones(&self.differences).unwrap_or_default();
+        let mean = |tones: &[Tone], of: fn(&Tone) -> f64| {
+            tones.iter().map(of).sum::<f64>() / tones.len() as f64
+        };
+        let tries = passes.iter().map(|tone| tone.tries).fold(0, usize::max);
+        let test = |tones: &[Tone]| (mean(tones, |tone| tone.ln_p), mean(tones, |tone| tone.ratio));
+        let (ln_p, ratio) = test(&passes);
+        if differences.is_empty() {
+            let amplitude = [mean(&passes, |tone| tone.amplitude); 2];
+            return Some(SpeedLine { passes, ratio, amplitude, ln_p, tries });
+        }
+        let of_differences = test(&differences);
+        let (ln_p, ratio) = if of_differences.0 < ln_p { of_differences } else { (ln_p, ratio) };
+        let ln_p = bonferroni(ln_p, 2);
+        // Two equal tones differ by twice their amplitude at most. What the passes share adds to it.
+        let least = 0.5 * mean(&differences, |tone| tone.amplitude);
+        let largest = passes.iter().map(|tone| tone.amplitude).fold(0.0, f64::max);
+        Some(SpeedLine { passes, ratio, amplitude: [least, largest], ln_p, tries })
+    }
+}
+
+/// What a pass has beside the mean of other passes at the same positions. `None` without others or a common
+/// stretch.
+fn difference(pass: &Pass, others: &[&Pass]) -> Option<PassSpectra> {
+    let ends = |pass: &&Pass| [pass.position_m[0], pass.position_m[pass.position_m.len() - 1]];
+    let common = others.iter().map(ends).reduce(|a, b| [a[0].max(b[0]), a[1].min(b[1])])?;
+    let own = &pass.position_m;
+    let from = own.partition_point(|&x| x < common[0]);
+    let to = own.partition_point(|&x| x <= common[1]);
+    let beside = |index: usize| {
+        let there = others.iter().map(|other| value_at(other, own[index]));
+        pass.signal.samples()[index] - there.sum::<f64>() / others.len() as f64
+    };
+    (from < to).then(|| PassSpectra::new(&(from..to).map(beside).collect::<Vec<_>>(), pass))
+}
+
+/// Linear interpolation of the samples at a position between the ends of the pass.
+fn value_at(pass: &Pass, x_m: f64) -> f64 {
+    let (samples, index) = (pass.signal.samples(), index_at(&pass.position_m, x_m));
+    let low = (index as usize).min(samples.len() - 2);
+    samples[low] + (index - low as f64) * (samples[low + 1] - samples[low])
 }
 
 /// Spectra of the segments of a pass.
@@ -182,9 +269,10 @@ struct Tone {
 }
 
 impl PassSpectra {
-    fn of(pass: &Pass) -> Self {
-        let (samples, rate_hz) = (pass.signal.samples(), pass.signal.sample_rate_hz());
-        let segments = ((pass.signal.duration_s() / SEGMENT_S) as usize).max(1);
+    /// Spectra of samples of a pass, or of what it has beside others.
+    fn new(samples: &[f64], pass: &Pass) -> Self {
+        let rate_hz = pass.signal.sample_rate_hz();
+        let segments = ((samples.len() as f64 / rate_hz / SEGMENT_S) as usize).max(1);
         let length = samples.len() / segments;
         let spectrum = |part: &[f64]| {
             let mean = part.iter().sum::<f64>() / length as f64;

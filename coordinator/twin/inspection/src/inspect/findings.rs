@@ -65,7 +65,8 @@ pub(super) fn hum_finding(lines: &[Hum], unit: &str) -> Option<Finding> {
             ("amplitude_m_s2", first.amplitude_m_s2),
         ]),
         evidence: format!(
-            "lines at frequencies of the mains, {} times above their neighbours: {}",
+            "lines at frequencies of the mains, {} times above their neighbours in the passes or in \
+                 their differences: {}",
             ratio(first.ratio),
             names.join(", ")
         ),
