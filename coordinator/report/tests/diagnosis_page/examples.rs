@@ -127,6 +127,7 @@ pub(crate) fn consistent() -> Diagnosis {
         track: track(|_| 1.0),
         levels: levels(|_| 0.0),
         confirmation: None,
+        support_changes: Vec::new(),
         loss_of_contact: None,
         notes: vec!["Below 150 Hz a level scatters by 4 dB: what acts only there may stay unseen.".to_owned()],
         sections: Vec::new(),

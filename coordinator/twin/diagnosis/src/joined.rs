@@ -2,7 +2,7 @@
 
 mod hypotheses;
 
-use crate::conclusion::{airborne, verdict};
+use crate::conclusion::{further, verdict};
 use crate::outcome::{
     BeforeAfter, Confirmation, Diagnosis, FORMAT, FitScores, Levels, Mismatch, Score, Scores,
     SectionVerdict, Verdict,
@@ -10,6 +10,7 @@ use crate::outcome::{
 use crate::prepared_recording::overlapping;
 use crate::section::owner;
 use crate::sentence::sentence;
+use crate::variation::joined_support_changes;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use tracktwin_inspection::chain::LossOfContact;
@@ -67,11 +68,15 @@ pub fn joined(
     let (fit, bias_removed) = (whole.fit(), whole.bias_removed());
     let said =
         sentence(verdict, &hypotheses, nothing.unwrap_or_default(), ids, &fit, &bias_removed);
+    // A section without a fitted track says nothing about the support.
+    let fitted = sections.iter().filter(|it| !it.diagnosis.track.is_empty());
+    let found = fitted.map(|it| (it.sleepers.clone(), &it.diagnosis.support_changes[..]));
+    let support_changes = joined_support_changes(ids, &found.collect::<Vec<_>>());
     Some(Diagnosis {
         format: FORMAT.to_owned(),
         recording: sections[0].diagnosis.recording.clone(),
         verdict,
-        sentence: said + &airborne(loss_of_contact.as_ref()),
+        sentence: said + &further(&support_changes, loss_of_contact.as_ref()),
         nothing_left_out: nothing,
         mismatches: whole.mismatches(),
         hypotheses,
@@ -80,6 +85,7 @@ pub fn joined(
         track: whole.own_entries(|it| &it.track),
         levels: whole.levels(),
         confirmation: whole.confirmation(),
+        support_changes,
         loss_of_contact,
         notes: whole.notes(),
         sections: sections.iter().map(|section| whole.verdict_of(section)).collect(),

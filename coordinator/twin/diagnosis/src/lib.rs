@@ -62,4 +62,7 @@ pub use search::{Fitted, Round, SearchOutcome, Stage, first_calibration, search}
 pub use section::{Section, owner};
 pub use signature::signature;
 pub use spectra::{Spectra, SpeedSpectra, are_one_speed};
-pub use variation::{Exception, SupportChange, Variation};
+pub use variation::{
+    Amplitude, BALLAST_ERROR, Exception, FoundSupportChange, Quadratic, SupportChange,
+    SupportChangeKind, Variation, joined_support_changes, learn_variation,
+};

@@ -2,6 +2,7 @@
 
 use crate::behaviour::Element;
 use crate::estimate::Estimate;
+use crate::variation::FoundSupportChange;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use tracktwin_inspection::chain::LossOfContact;
@@ -47,7 +48,7 @@ pub struct Diagnosis {
     pub recording: String,
     /// Verdict on the recording.
     pub verdict: Verdict,
-    /// The verdict as a self-contained sentence.
+    /// The verdict as a self-contained sentence, and what is stated beside it: support changes and contact loss.
     pub sentence: String,
     /// Probability that nothing is left out; `None` if no track model was compared.
     #[serde(skip_serializing_if = "Option::is_none", default)]
@@ -68,6 +69,10 @@ pub struct Diagnosis {
     /// accepted extension is visible in a simulated pass.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub confirmation: Option<Confirmation>,
+    /// Transitions and soft or stiff spots of the support, along the track. They are part of the baseline, so that they
+    /// are no left-out physics.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub support_changes: Vec<FoundSupportChange>,
     /// Contact loss between wheel and rail; the fit is not valid on these stretches.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub loss_of_contact: Option<LossOfContact>,

@@ -2,9 +2,11 @@
 
 use crate::fit::Fitted;
 use crate::record::{Along, Inversion, Prior, Provenance, Sleeper, log_normal};
-use crate::support_changes::changes;
 use std::collections::BTreeMap;
-use tracktwin_diagnosis::{Common, Mean, Own, PreparedRecording, Unknowns, owner};
+use tracktwin_diagnosis::{
+    Common, FoundSupportChange, Mean, Own, PreparedRecording, Unknowns, joined_support_changes,
+    owner,
+};
 use tracktwin_evaluation::{Estimates, Flag, Unevaluated};
 use tracktwin_parameters::Parameter;
 use tracktwin_signal::recording::Recording;
@@ -35,9 +37,23 @@ impl Inversion {
             let index = number - prepared.first_sleeper;
             sleepers.push(fitted.sleeper(index, &place.id, place.x_m, resolved));
         }
-        let changes = changes(recording, sections);
+        let found: Vec<_> = sections.iter().map(|it| support_changes(recording, it)).collect();
+        let found: Vec<_> =
+            ranges.iter().cloned().zip(found.iter().map(|found| &found[..])).collect();
+        let ids: Vec<String> = recording.sleepers.iter().map(|place| place.id.clone()).collect();
+        let changes = joined_support_changes(&ids, &found);
         Self::new(recording.name.clone(), provenance(sections), sleepers, unevaluated, changes)
     }
+}
+
+/// The support changes of a fitted section.
+fn support_changes(
+    recording: &Recording,
+    (prepared, fitted): &(PreparedRecording, Fitted),
+) -> Vec<FoundSupportChange> {
+    let id = |sleeper: usize| recording.sleepers[prepared.first_sleeper + sleeper].id.clone();
+    let found = fitted.unknowns.support_changes.iter().zip(&fitted.changes);
+    found.map(|(&change, &amplitude)| FoundSupportChange::new(change, amplitude, id)).collect()
 }
 
 impl Fitted {

@@ -1,11 +1,10 @@
 //! The fit of one section of track.
 
-use crate::quadratic::Quadratic;
-use crate::variation::learn;
 use nalgebra::{DMatrix, DVector};
 use tracktwin_diagnosis::{
-    Calibration, CalibrationError, Candidate, Forward, Mean, NullModel, Observation, Own,
-    PreparationError, PreparedRecording, Problem, SupportChange, Unknowns, Variation,
+    Amplitude, BALLAST_ERROR, Calibration, CalibrationError, Candidate, Forward, Mean, NullModel,
+    Observation, Own, PreparationError, PreparedRecording, Problem, Quadratic, Unknowns, Variation,
+    learn_variation,
 };
 use tracktwin_parameters::Track;
 use tracktwin_signal::recording::Recording;
@@ -24,7 +23,7 @@ const RESPONSE: f64 = 0.09;
 /// Error of a sleeper's ballast and railpad stiffness in addition to its posterior, as a share of the variation
 /// along the track. It covers the difference between model and reality; measured with `tracktwin coverage --method
 /// inversion` on recordings of two simulators.
-const MISPLACED: [f64; 2] = [0.35, 0.6];
+const MISPLACED: [f64; 2] = [BALLAST_ERROR, 0.6];
 
 /// Error of the logarithm of the quantities common to a section's sleepers, in addition to the posterior:
 /// real sleepers taper and differ, and their shear stiffness is assumed.
@@ -60,18 +59,6 @@ pub struct Fitted {
     /// Misfit of every sleeper: sum of squares of its whitened residual, divided by the number of its log
     /// powers; about 0.7 if the model is valid.
     pub misfit: Vec<f64>,
-}
-
-/// Change of the logarithm of the ballast stiffness by a support change: a transition's stiffness behind it minus
-/// before it, a spot's stiffness minus that on both sides.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Amplitude {
-    /// Posterior mean.
-    pub log: f64,
-    /// Posterior standard deviation.
-    pub deviation: f64,
-    /// Probability that there is a change and not only variation between sleepers.
-    pub probability: f64,
 }
 
 /// Splits a recording into sections that are fitted one by one.
@@ -119,7 +106,7 @@ pub fn fit(
         calibration = fit(&forward, &factors, calibration.values)?;
         let data = Quadratic::new(&calibration, forward.unknowns.typical(), known)
             .ok_or(CalibrationError::NotFinite)?;
-        probabilities = learn(&mut forward.unknowns, &data);
+        probabilities = learn_variation(&mut forward.unknowns, &data);
         let best = data.best(&forward.unknowns).ok_or(CalibrationError::NotFinite)?;
         let mut start = calibration.values;
         start.rows_mut(0, best.len()).copy_from(&best);
@@ -258,18 +245,7 @@ impl Fitted {
             },
         );
         let misplaced: Vec<_> = misplaced.collect();
-        let known = &unknowns.support_changes;
-        let amplitude = |(&change, &probability): (&SupportChange, &f64)| {
-            let others: Vec<_> = known.iter().copied().filter(|other| *other != change).collect();
-            let contrast = change.contrast(unknowns.ballast().len(), &others);
-            let range = unknowns.ballast();
-            let of = values.rows(range.start, range.len());
-            let within = covariance.view((range.start, range.start), (range.len(), range.len()));
-            let variance =
-                contrast.dot(&(within * &contrast)) + misplaced[0].1 * contrast.norm_squared();
-            Amplitude { log: contrast.dot(&of), deviation: variance.sqrt(), probability }
-        };
-        let changes = known.iter().zip(probabilities).map(amplitude).collect();
+        let changes = Amplitude::all(&unknowns, probabilities, &values, &covariance);
         for (range, variance) in misplaced {
             range.for_each(|index| deviations[index] += variance);
         }

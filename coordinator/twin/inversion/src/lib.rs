@@ -43,16 +43,12 @@ mod along;
 mod beside;
 mod files;
 mod fit;
-mod quadratic;
 mod record;
 mod stored;
-mod support_changes;
-mod variation;
 
 pub use accepted::{accepted, modelled};
 pub use beside::{Beside, beside};
-pub use fit::{Amplitude, Fitted, fit, sections};
+pub use fit::{Fitted, fit, sections};
 pub use record::{
     Along, COMMON, Inversion, METHOD, PER_SLEEPER, Prior, Provenance, Sleeper, Unexplained,
 };
-pub use support_changes::{Change, ChangeKind};

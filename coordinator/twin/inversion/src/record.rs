@@ -1,9 +1,8 @@
 //! Record of an inversion, from which files and pages are made.
 
-use crate::support_changes::Change;
 use serde::Serialize;
 use std::collections::BTreeMap;
-use tracktwin_diagnosis::Variation;
+use tracktwin_diagnosis::{FoundSupportChange, Variation};
 use tracktwin_evaluation::{Estimate, Estimates, FORMAT, Flag, Unevaluated};
 use tracktwin_parameters::Parameter;
 
@@ -34,7 +33,7 @@ pub struct Inversion {
     /// Sleepers without estimates: not every pass covers their window with a margin.
     pub unevaluated: Vec<Unevaluated>,
     /// Transitions and soft or stiff spots of the support, along the track.
-    pub support_changes: Vec<Change>,
+    pub support_changes: Vec<FoundSupportChange>,
     /// Part of the recording that the track model does not explain.
     pub outside_library: Unexplained,
     /// Notes on the result, one sentence each.
@@ -134,7 +133,7 @@ impl Inversion {
         provenance: Provenance,
         sleepers: Vec<Sleeper>,
         unevaluated: Vec<Unevaluated>,
-        support_changes: Vec<Change>,
+        support_changes: Vec<FoundSupportChange>,
     ) -> Self {
         let invalid = sleepers.iter().filter(|sleeper| !sleeper.is_valid()).count();
         let share = invalid as f64 / sleepers.len().max(1) as f64;
@@ -168,7 +167,7 @@ impl Inversion {
                 listed(&unexplained)
             ));
         }
-        sentences.extend(self.support_changes.iter().map(Change::sentence));
+        sentences.extend(self.support_changes.iter().map(FoundSupportChange::sentence));
         if !apart.is_empty() {
             sentences.push(format!(
                 "{} differ{} from the neighbouring sleepers by more than the track varies elsewhere.",

@@ -1,8 +1,8 @@
 //! A fitted section as a series of numbers, so that an interrupted inversion continues where it was.
 
-use crate::fit::{Amplitude, Fitted, unknowns_of};
+use crate::fit::{Fitted, unknowns_of};
 use nalgebra::DVector;
-use tracktwin_diagnosis::{Exception, Own, PreparedRecording, SupportChange, Variation};
+use tracktwin_diagnosis::{Amplitude, Exception, Own, PreparedRecording, SupportChange, Variation};
 
 /// Kinds of stored support changes.
 const TRANSITION: f64 = 0.0;

@@ -66,6 +66,7 @@ pub fn passes_alone(
         track: Vec::new(),
         levels: Levels::default(),
         confirmation: None,
+        support_changes: Vec::new(),
         loss_of_contact: inspection.loss_of_contact.clone(),
         notes,
         sections: Vec::new(),

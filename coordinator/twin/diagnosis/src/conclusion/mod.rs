@@ -8,8 +8,10 @@ mod notes;
 mod place;
 mod round;
 mod speed_disagreement;
+mod support_changes;
 
 pub use self::alone::passes_alone;
+pub(crate) use self::support_changes::further;
 use crate::calibration::CalibrationError;
 use crate::outcome::{Diagnosis, FORMAT, Hypothesis, Location, UNKNOWN, Verdict, meet};
 use crate::port_scan::PortPlace;
@@ -18,7 +20,7 @@ use crate::search::SearchOutcome;
 use crate::sentence::sentence;
 use std::collections::BTreeMap;
 use tracktwin_inspection::Inspection;
-use tracktwin_inspection::chain::{LossOfContact, PassDefect};
+use tracktwin_inspection::chain::PassDefect;
 use tracktwin_signal::recording::Recording;
 use tracktwin_track::extension::{
     EffectFamily, FLEXIBLE_AXLE_BOX, Kind, LookAlikeGroup, SENSOR_MOUNT_RESONANCE, SUBGRADE_LAYER,
@@ -97,7 +99,9 @@ impl Evidence<'_> {
         let count = self.prepared.forward.section.sleepers;
         let sleepers: Vec<String> = (0..count).map(|sleeper| self.id(sleeper)).collect();
         let said = sentence(verdict, &hypotheses, nothing_left_out, &sleepers, &fit, &bias_removed);
-        let sentence = said + &airborne(self.inspection.loss_of_contact.as_ref());
+        let support_changes = self.support_changes(verdict);
+        let loss_of_contact = self.inspection.loss_of_contact.clone();
+        let sentence = said + &further(&support_changes, loss_of_contact.as_ref());
         let notes = self.notes(&hypotheses);
         Ok(Diagnosis {
             format: FORMAT.to_owned(),
@@ -112,7 +116,8 @@ impl Evidence<'_> {
             track: self.track(),
             levels,
             confirmation: None,
-            loss_of_contact: self.inspection.loss_of_contact.clone(),
+            support_changes,
+            loss_of_contact,
             notes,
             sections: Vec::new(),
         })
@@ -322,15 +327,6 @@ pub(crate) fn verdict(hypotheses: &[Hypothesis]) -> Verdict {
         Some(kind) if kind.measuring_chain => Verdict::MeasurementChain,
         Some(_) => Verdict::LeftOutPhysics,
     }
-}
-
-/// Sentence on contact loss, which no fit includes.
-pub(crate) fn airborne(lost: Option<&LossOfContact>) -> String {
-    let Some(lost) = lost else { return String::new() };
-    let [from_m, to_m] = lost.reach_m();
-    format!(
-        " The wheel loses contact with the rail from {from_m:.2} to {to_m:.2} m, where no linear fit holds."
-    )
 }
 
 fn names(kind: &Kind) -> Vec<String> {

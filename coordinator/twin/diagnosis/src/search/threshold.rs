@@ -5,7 +5,7 @@ use super::extent::Extent;
 use super::probability::EVIDENCE_TEMPERING;
 use crate::candidate::Candidate;
 use crate::section::Section;
-use tracktwin_track::extension::{Class, PlaceKind};
+use tracktwin_track::extension::Class;
 
 /// Smallest ratio of a candidate's log evidence to the part of an accepted one's that belongs to its
 /// location. A model error looks like a small second effect there, except for an effect without a location
@@ -25,11 +25,11 @@ const FURTHER_MIN: f64 = 30.0;
 /// named rightly on a line had 16.
 const FIRST_MIN: f64 = 15.0;
 
-/// Smallest log evidence in nats, on a track other than V-Track, of a defect at a point of the rail that the
-/// passes alone do not show: it is a random part of the surface rather than a defect. All speeds pass the same
-/// surface, so that a held-out speed does not tell. On a recording of another simulator a squat that did not
-/// exist had 11 nats, on another one 15.
-const UNSEEN_SHAPE_MIN: f64 = 20.0;
+/// Smallest log evidence in nats, on a track other than V-Track, of a local shape of the rail that the passes alone do
+/// not show: it is a random part of the surface rather than a defect. All speeds pass the same surface, so that a
+/// held-out speed does not tell. On recordings of another simulator squats that did not exist had 11 and 15 nats, and
+/// corrugation over one spacing 24.
+const UNSEEN_SHAPE_MIN: f64 = 25.0;
 
 /// Largest ratio of the gain of a fit to that of the best trial with free strength. A candidate that cannot
 /// reach the threshold in addition to an accepted one is not fitted.
@@ -57,7 +57,7 @@ impl EvidenceThreshold<'_> {
         let alone = match (self.section.is_v_track(), self.accepted.is_empty()) {
             (true, _) => alone,
             (false, false) => FURTHER_MIN,
-            (false, true) if self.is_unseen_defect(candidate) => UNSEEN_SHAPE_MIN,
+            (false, true) if self.is_unseen_shape(candidate) => UNSEEN_SHAPE_MIN,
             (false, true) => FIRST_MIN,
         };
         let known = self.accepted.iter();
@@ -65,11 +65,9 @@ impl EvidenceThreshold<'_> {
         beside.fold(alone, f64::max)
     }
 
-    /// Whether a candidate is a defect at a point of the rail that the passes alone do not show.
-    fn is_unseen_defect(self, candidate: &Candidate) -> bool {
-        is_local_shape(candidate)
-            && candidate.kind.place == PlaceKind::Point
-            && !is_detected(candidate, self.section, self.detected_shapes_m)
+    /// Whether a candidate is a local shape of the rail that the passes alone do not show.
+    fn is_unseen_shape(self, candidate: &Candidate) -> bool {
+        is_local_shape(candidate) && !is_detected(candidate, self.section, self.detected_shapes_m)
     }
 
     fn is_detected_by_passes(self, candidate: &Candidate) -> bool {

@@ -30,6 +30,10 @@ const WAVES_MIN: f64 = 10.0;
 /// Distance of the nearer neighbours in resolution cells, relative to which a line must be significant too.
 /// The flanks of a lightly damped resonance are no background.
 const NEAR: f64 = 8.0;
+/// Another speed has a line of the same wavelength if its probability by chance is below this.
+const SAME_LENGTH: f64 = 0.01;
+/// Smallest share of a pass that another one must cover to be compared with it.
+const COVERED: f64 = 0.8;
 /// A line within this number of resolution cells of a sleeper or wheel harmonic may belong to it.
 const CELLS_APART: f64 = 1.5;
 
@@ -38,7 +42,8 @@ const CELLS_APART: f64 = 1.5;
 pub struct Hum {
     /// Frequency in Hz.
     pub frequency_hz: f64,
-    /// Amplitude in m/s2, as mean of all passes, and its standard deviation.
+    /// Amplitude in m/s2 and its standard deviation: mean of all passes, weighted by the inverse power beside the
+    /// line. It is too large where the line is hardly above its neighbours.
     pub amplitude_m_s2: (f64, f64),
     /// Power relative to the neighbours, as mean of all speeds; in the passes or in their differences.
     pub ratio: f64,
@@ -53,16 +58,17 @@ pub struct Hum {
 /// lines.
 pub fn hum(recording: &Recording, turn_m: Option<f64>, alpha: f64) -> Vec<Hum> {
     let lengths_m: Vec<f64> = turn_m.into_iter().chain([recording.spacing_m]).collect();
-    let groups = by_speed(&recording.passes).into_iter();
-    let speeds: Vec<Speed> = groups.map(|group| Speed::of(recording, &group)).collect();
+    let groups = by_speed(&recording.passes);
+    // At a single speed an order of the wheel, which the differences contain, may be at a frequency of the mains.
+    let compare = groups.len() > 1;
+    let speeds: Vec<Speed> =
+        groups.iter().map(|group| Speed::of(recording, group, compare)).collect();
     let mut found = Vec::new();
     let mut tries = 0;
-    for (mains, harmonics) in MAINS_HZ {
-        for harmonic in 1..=harmonics {
-            let (line, bins) = line(&speeds, &lengths_m, mains * harmonic as f64);
-            tries += bins;
-            found.extend(line);
-        }
+    for mains_hz in mains_hz() {
+        let (line, bins) = line(&speeds, &lengths_m, mains_hz);
+        tries += bins;
+        found.extend(line);
     }
     for line in &mut found {
         line.ln_p = bonferroni(line.ln_p, tries);
@@ -70,6 +76,13 @@ pub fn hum(recording: &Recording, turn_m: Option<f64>, alpha: f64) -> Vec<Hum> {
     found.retain(|line: &Hum| line.ln_p <= alpha.ln());
     found.sort_by(|a, b| a.ln_p.total_cmp(&b.ln_p));
     found
+}
+
+/// All tested frequencies in Hz.
+fn mains_hz() -> impl Iterator<Item = f64> {
+    MAINS_HZ.into_iter().flat_map(|(mains_hz, harmonics)| {
+        (1..=harmonics).map(move |harmonic| mains_hz * harmonic as f64)
+    })
 }
 
 /// The recording without these lines. In every pass, or every segment of a long one, the tone that fits best within
@@ -120,8 +133,11 @@ fn line(speeds: &[Speed], lengths_m: &[f64], frequency: f64) -> (Option<Hum>, us
     let lines: Option<Vec<_>> = speeds.iter().map(|speed| speed.line(frequency)).collect();
     let Some(lines) = lines else { return (None, 0) };
     let tries = lines.iter().map(|line| line.tries).fold(0, usize::max);
-    // Where it may be the sleepers' or the blows' a line says nothing either way.
-    let may_be_of = |speed: &Speed| lengths_m.iter().any(|&it| speed.may_be_of(frequency, it));
+    // Where it may be the sleepers', the blows' or an order's of the wheel a line says nothing either way.
+    let may_be_of = |speed: &Speed| {
+        lengths_m.iter().any(|&it| speed.may_be_of(frequency, it))
+            || speeds.iter().any(|other| speed.shares_length(other, frequency))
+    };
     let own = speeds.iter().zip(&lines).filter(|(speed, _)| !may_be_of(speed));
     let own: Vec<&SpeedLine> = own.map(|(_, line)| line).collect();
     let detected = own.iter().filter(|line| line.ln_p <= EACH_SPEED.ln()).count();
@@ -185,23 +201,35 @@ struct SpeedLine {
 }
 
 impl Speed {
-    fn of(recording: &Recording, group: &[usize]) -> Self {
+    fn of(recording: &Recording, group: &[usize], compare: bool) -> Self {
         let pass = |index: usize| &recording.passes[index];
-        let differences = group.iter().filter_map(|&index| {
+        let others = |index: usize| {
             let others = group.iter().filter(|&&other| other != index).map(|&other| pass(other));
-            difference(pass(index), &others.collect::<Vec<_>>())
-        });
+            others.collect::<Vec<_>>()
+        };
+        let compared = group.iter().filter(|_| compare);
+        let spectra = |&index: &usize| PassSpectra::new(pass(index).signal.samples(), pass(index));
         Self {
-            passes: group
-                .iter()
-                .map(|&index| PassSpectra::new(pass(index).signal.samples(), pass(index)))
+            passes: group.iter().map(spectra).collect(),
+            differences: compared
+                .filter_map(|&index| difference(pass(index), &others(index)))
                 .collect(),
-            differences: differences.collect(),
         }
     }
 
     fn may_be_of(&self, frequency: f64, length_m: f64) -> bool {
         self.passes.iter().any(|pass| pass.may_be_of(frequency, length_m))
+    }
+
+    /// Whether another speed has a line of the same wavelength, which is then one of the wheel or the surface. A
+    /// line that may be hum itself tells nothing.
+    fn shares_length(&self, other: &Self, frequency: f64) -> bool {
+        let [own_m_s, other_m_s] = [self, other].map(|speed| speed.passes[0].speed_m_s);
+        let there_hz = frequency * other_m_s / own_m_s;
+        let width_hz = CELLS_APART / other.passes[0].duration_s + DRIFT_HZ * there_hz / 50.0;
+        own_m_s != other_m_s
+            && mains_hz().all(|mains_hz| (mains_hz - there_hz).abs() > width_hz)
+            && other.line(there_hz).is_some_and(|line| line.ln_p <= SAME_LENGTH.ln())
     }
 
     fn line(&self, frequency: f64) -> Option<SpeedLine> {
@@ -213,36 +241,55 @@ impl Speed {
         let mean = |tones: &[Tone], of: fn(&Tone) -> f64| {
             tones.iter().map(of).sum::<f64>() / tones.len() as f64
         };
-        let tries = passes.iter().map(|tone| tone.tries).fold(0, usize::max);
+        let all = passes.iter().chain(&differences);
+        let tries = all.map(|tone| tone.tries).fold(0, usize::max);
         let test = |tones: &[Tone]| (mean(tones, |tone| tone.ln_p), mean(tones, |tone| tone.ratio));
         let (ln_p, ratio) = test(&passes);
+        let amplitude = [mean(&passes, |tone| tone.amplitude); 2];
         if differences.is_empty() {
-            let amplitude = [mean(&passes, |tone| tone.amplitude); 2];
             return Some(SpeedLine { passes, ratio, amplitude, ln_p, tries });
         }
-        let of_differences = test(&differences);
-        let (ln_p, ratio) = if of_differences.0 < ln_p { of_differences } else { (ln_p, ratio) };
-        let ln_p = bonferroni(ln_p, 2);
+        let (ln_p_there, ratio_there) = test(&differences);
+        if ln_p <= ln_p_there {
+            return Some(SpeedLine { passes, ratio, amplitude, ln_p: bonferroni(ln_p, 2), tries });
+        }
         // Two equal tones differ by twice their amplitude at most. What the passes share adds to it.
-        let least = 0.5 * mean(&differences, |tone| tone.amplitude);
+        let least = 0.5 * mean(&differences, Tone::amplitude_without_background);
         let largest = passes.iter().map(|tone| tone.amplitude).fold(0.0, f64::max);
-        Some(SpeedLine { passes, ratio, amplitude: [least, largest], ln_p, tries })
+        Some(SpeedLine {
+            passes,
+            ratio: ratio_there,
+            amplitude: [least, largest],
+            ln_p: bonferroni(ln_p_there, 2),
+            tries,
+        })
     }
 }
 
-/// What a pass has beside the mean of other passes at the same positions. `None` without others or a common
-/// stretch.
+/// What a pass has beside the mean of other passes at the same positions. `None` without another pass that covers
+/// most of this one.
 fn difference(pass: &Pass, others: &[&Pass]) -> Option<PassSpectra> {
-    let ends = |pass: &&Pass| [pass.position_m[0], pass.position_m[pass.position_m.len() - 1]];
-    let common = others.iter().map(ends).reduce(|a, b| [a[0].max(b[0]), a[1].min(b[1])])?;
     let own = &pass.position_m;
-    let from = own.partition_point(|&x| x < common[0]);
-    let to = own.partition_point(|&x| x <= common[1]);
+    let covered = |other: &Pass| {
+        let places = &other.position_m;
+        let from = own.partition_point(|&x| x < places[0]);
+        from..own.partition_point(|&x| x <= places[places.len() - 1]).max(from)
+    };
+    let is_whole = |other: &&Pass| {
+        other.position_m.len() > 1 && covered(other).len() as f64 >= COVERED * own.len() as f64
+    };
+    let others: Vec<&Pass> = others.iter().copied().filter(is_whole).collect();
+    let common = others
+        .iter()
+        .copied()
+        .map(covered)
+        .reduce(|one, other| one.start.max(other.start)..one.end.min(other.end))?;
     let beside = |index: usize| {
         let there = others.iter().map(|other| value_at(other, own[index]));
         pass.signal.samples()[index] - there.sum::<f64>() / others.len() as f64
     };
-    (from < to).then(|| PassSpectra::new(&(from..to).map(beside).collect::<Vec<_>>(), pass))
+    let samples: Vec<f64> = common.map(beside).collect();
+    (!samples.is_empty()).then(|| PassSpectra::new(&samples, pass))
 }
 
 /// Linear interpolation of the samples at a position between the ends of the pass.
@@ -266,6 +313,12 @@ struct Tone {
     amplitude: f64,
     ln_p: f64,
     tries: usize,
+}
+
+impl Tone {
+    fn amplitude_without_background(&self) -> f64 {
+        self.amplitude * (1.0 - self.ratio.recip()).max(0.0).sqrt()
+    }
 }
 
 impl PassSpectra {

@@ -1,5 +1,15 @@
 //! How the parameters of sleepers vary along the track.
 
+mod change;
+mod learn;
+mod quadratic;
+
+pub use change::{
+    Amplitude, BALLAST_ERROR, FoundSupportChange, SupportChangeKind, joined_support_changes,
+};
+pub use learn::learn_variation;
+pub use quadratic::Quadratic;
+
 use crate::quantity::Own;
 use nalgebra::DVector;
 use std::ops::Range;
@@ -71,19 +81,6 @@ impl SupportChange {
             let (before, after) = change.neighbours();
             before + 1 >= BESIDE && after + BESIDE <= sleepers
         })
-    }
-
-    /// The same change this number of sleepers farther along the track.
-    #[must_use]
-    pub fn behind(self, sleepers: usize) -> Self {
-        match self {
-            Self::Transition { before, after } => {
-                Self::Transition { before: before + sleepers, after: after + sleepers }
-            }
-            Self::Spot { first, last } => {
-                Self::Spot { first: first + sleepers, last: last + sleepers }
-            }
-        }
     }
 
     /// The last sleeper before the change and the first one behind it.

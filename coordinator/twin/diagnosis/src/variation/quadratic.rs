@@ -1,12 +1,15 @@
 //! The likelihood near a fitted track, which gives the evidence of any Gaussian prior in closed form (Laplace), without
 //! the forward model.
 
+use crate::baseline::Unknowns;
+use crate::calibration::Calibration;
+use crate::candidate::Candidate;
 use nalgebra::{Cholesky, DMatrix, DVector};
-use tracktwin_diagnosis::{Calibration, Candidate, Unknowns};
 
 /// Quadratic log likelihood near a fitted track, integrated over the parameters of known physics:
 /// `-0.5 x' H x + b' x` plus a constant.
-pub(super) struct Quadratic {
+#[derive(Clone, Debug)]
+pub struct Quadratic {
     pub(super) information: DMatrix<f64>,
     pub(super) slope: DVector<f64>,
     pub(super) mean: DVector<f64>,
@@ -14,12 +17,9 @@ pub(super) struct Quadratic {
 
 impl Quadratic {
     /// Makes it from the whitened residual and derivatives of a fit with `known` physics; `x` is the distance
-    /// from the prior's mean. `None` if a number is not finite.
-    pub(super) fn new(
-        calibration: &Calibration,
-        mean: DVector<f64>,
-        known: &[Candidate],
-    ) -> Option<Self> {
+    /// from the prior's mean, in natural logarithms. `None` if the information on the known physics is not positive
+    /// definite.
+    pub fn new(calibration: &Calibration, mean: DVector<f64>, known: &[Candidate]) -> Option<Self> {
         let jacobian = &calibration.jacobian;
         let priors = |candidate: &Candidate| -> Vec<(f64, f64)> {
             candidate.free.iter().map(|parameter| candidate.prior(parameter)).collect()
@@ -50,8 +50,9 @@ impl Quadratic {
         })
     }
 
-    /// Log evidence of a prior in nats, up to a constant of the data.
-    pub(super) fn log_evidence(&self, unknowns: &Unknowns) -> f64 {
+    /// Log evidence of a prior in nats, up to a constant of the data; negative infinity if a precision is not positive
+    /// definite.
+    pub fn log_evidence(&self, unknowns: &Unknowns) -> f64 {
         let precision = unknowns.precision();
         let Some(prior) = Cholesky::new(precision.clone()) else { return f64::NEG_INFINITY };
         let Some(posterior) = Cholesky::new(precision + &self.information) else {
@@ -79,8 +80,15 @@ impl Quadratic {
         Some(directions.iter().map(gain).collect())
     }
 
-    /// The values of greatest posterior probability under a prior.
-    pub(super) fn best(&self, unknowns: &Unknowns) -> Option<DVector<f64>> {
+    /// Mean and covariance of the posterior under a prior, as natural logarithms in the order of the unknowns. `None` if
+    /// its precision is not positive definite.
+    pub fn posterior(&self, unknowns: &Unknowns) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let posterior = Cholesky::new(unknowns.precision() + &self.information)?;
+        Some((&self.mean + posterior.solve(&self.slope), posterior.inverse()))
+    }
+
+    /// The values of greatest posterior probability under a prior, as [`Quadratic::posterior`].
+    pub fn best(&self, unknowns: &Unknowns) -> Option<DVector<f64>> {
         let posterior = Cholesky::new(unknowns.precision() + &self.information)?;
         Some(&self.mean + posterior.solve(&self.slope))
     }
@@ -89,10 +97,12 @@ impl Quadratic {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bands::Bands;
+    use crate::forward::Forward;
+    use crate::section::Section;
     use rand_chacha::ChaCha8Rng;
     use rand_chacha::rand_core::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
-    use tracktwin_diagnosis::{Bands, Forward, Section};
     use tracktwin_parameters::TrackDesign;
     use tracktwin_track::extension::{ExtensionInstance, Kind};
 

@@ -1,8 +1,9 @@
 //! Variation between the sleepers of a recording: the prior's variation, support changes and exceptions that
 //! maximise the evidence.
 
-use crate::quadratic::Quadratic;
-use tracktwin_diagnosis::{Exception, Own, SupportChange, Unknowns, Variation};
+use super::{Exception, Quadratic, SupportChange, Variation};
+use crate::baseline::Unknowns;
+use crate::quantity::Own;
 
 /// Factors on a deviation or a length that the search tries.
 const FACTORS: [f64; 4] = [0.5, 0.75, 1.35, 2.0];
@@ -52,8 +53,9 @@ fn log_prior(variation: &Variation) -> f64 {
 }
 
 /// Sets the variation, the support changes and the exceptions of `unknowns` to the values with the greatest
-/// evidence. Returns the probability of each support change.
-pub(super) fn learn(unknowns: &mut Unknowns, data: &Quadratic) -> Vec<f64> {
+/// evidence; those that it has are forgotten. Returns the probability of each support change (0.5 to 0.97), in the order
+/// of `unknowns.support_changes`.
+pub fn learn_variation(unknowns: &mut Unknowns, data: &Quadratic) -> Vec<f64> {
     unknowns.exceptions.clear();
     unknowns.support_changes.clear();
     vary(unknowns, data);
@@ -191,11 +193,13 @@ fn greatest<'a, T>(gains: &[f64], all: &'a [T]) -> Option<(f64, &'a T)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bands::Bands;
+    use crate::forward::Forward;
+    use crate::section::Section;
     use nalgebra::{DMatrix, DVector};
     use rand_chacha::ChaCha8Rng;
     use rand_chacha::rand_core::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
-    use tracktwin_diagnosis::{Bands, Forward, Section};
     use tracktwin_parameters::TrackDesign;
 
     const SLEEPERS: usize = 24;
@@ -225,7 +229,7 @@ mod tests {
         for scatter in [0.05, 0.15, 0.3] {
             let mut unknowns = unknowns();
             let data = measured(&unknowns, scatter, None);
-            learn(&mut unknowns, &data);
+            learn_variation(&mut unknowns, &data);
             let Variation { smooth, independent, .. } = unknowns.variation[0];
             let learned = smooth.hypot(independent);
             // Twenty-four values know a deviation to 15 %; the prior's median adds its own pull.
@@ -272,7 +276,7 @@ mod tests {
                 let mut unknowns = unknowns();
                 let varied = varied(0.08, 0.6, seed);
                 let data = measured_as(&unknowns, |it| varied[it] - 0.6 * change.share(it));
-                learn(&mut unknowns, &data);
+                learn_variation(&mut unknowns, &data);
                 found += usize::from(unknowns.support_changes.contains(&change));
             }
             assert!(found >= 8, "{change:?}: {found} of 10");
@@ -287,7 +291,7 @@ mod tests {
                 let mut unknowns = unknowns();
                 let varied = varied(deviation, length, 100 + seed);
                 let data = measured_as(&unknowns, |it| varied[it]);
-                learn(&mut unknowns, &data);
+                learn_variation(&mut unknowns, &data);
                 found += usize::from(!unknowns.support_changes.is_empty());
             }
         }
@@ -305,7 +309,7 @@ mod tests {
                 let soft = |it| if it == 5 { -1.2 } else { 0.0 };
                 let data =
                     measured_as(&unknowns, |it| varied[it] + soft(it) - size * step.share(it));
-                let probabilities = learn(&mut unknowns, &data);
+                let probabilities = learn_variation(&mut unknowns, &data);
                 assert_eq!(probabilities.len(), unknowns.support_changes.len());
                 assert!(probabilities.iter().all(|it| (0.5..=0.97).contains(it)));
                 let changes = &unknowns.support_changes;
@@ -320,7 +324,7 @@ mod tests {
     fn a_sleeper_far_from_its_neighbours_is_an_exception_and_leaves_theirs_alone() {
         let mut unknowns = unknowns();
         let data = measured(&unknowns, 0.05, Some((9, 0.9)));
-        learn(&mut unknowns, &data);
+        learn_variation(&mut unknowns, &data);
         assert_eq!(unknowns.exceptions, [Exception { field: Own::BallastStiffness, sleeper: 9 }]);
         assert!(unknowns.variation[0].independent < 0.12, "{:?}", unknowns.variation[0]);
         let best = data.best(&unknowns).unwrap() - &data.mean;
