@@ -46,8 +46,8 @@ const NAMED_SHARE: f64 = 0.65;
 /// Probability from which physics is accepted beside a fault of the measuring chain.
 const LIKELY: f64 = 0.5;
 
-/// Factor on the probability of a hypothesis that does not predict withheld speeds better, or that lacks a
-/// detected shape.
+/// Factor on the probability of a hypothesis that does not predict withheld speeds better, that lacks a detected shape,
+/// or that has no more evidence than errors of a line's model reach.
 const FAILED_SHARE: f64 = 0.1;
 
 /// Hypotheses with a smaller probability are not reported.

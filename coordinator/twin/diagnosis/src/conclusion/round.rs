@@ -47,8 +47,13 @@ impl Evidence<'_> {
         let is_certain =
             alone && nothing < NOTHING_LEFT && self.prepared.forward.section.is_v_track();
         let unnamed = !is_port && (is_certain || is_there && taken_back.is_some());
-        let (kept, unknown) =
-            if unnamed { (FAILED_SHARE, unknown + failed) } else { (is_new, unknown) };
+        let (kept, unknown) = if unnamed {
+            (FAILED_SHARE, unknown + failed)
+        } else if round.is_like_model_error {
+            (FAILED_SHARE * is_new, unknown)
+        } else {
+            (is_new, unknown)
+        };
         let mut hypotheses: Vec<Hypothesis> = round
             .fitted
             .iter()

@@ -100,6 +100,8 @@ pub struct Round {
     pub held_out_gain: Vec<f64>,
     /// Whether the best candidate was accepted.
     pub accepted: bool,
+    /// Whether the best candidate has no more evidence than errors of a line's model reach.
+    pub is_like_model_error: bool,
     /// Evidence in nats for unknown physics in the residual at the best candidate's location, if it led to
     /// the rejection of the candidate.
     pub remainder: Option<f64>,
@@ -310,6 +312,11 @@ impl SearchOutcome {
             (round, ports) =
                 setting.round(&problem, &self.last, all, threshold, &hopeless, progress)?;
         }
+        round.is_like_model_error = round.on_line
+            && round
+                .fitted
+                .first()
+                .is_some_and(|best| best.log_evidence < threshold.of(&best.candidate));
         let competitor = self.competing_unknown(&round, &ports, &forward.section);
         if let Some(best) =
             accepted_candidate(&round, competitor.as_ref(), setting.prepared, threshold)
