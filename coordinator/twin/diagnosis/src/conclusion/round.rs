@@ -47,13 +47,8 @@ impl Evidence<'_> {
         let is_certain =
             alone && nothing < NOTHING_LEFT && self.prepared.forward.section.is_v_track();
         let unnamed = !is_port && (is_certain || is_there && taken_back.is_some());
-        let (kept, unknown) = if unnamed {
-            (FAILED_SHARE, unknown + failed)
-        } else if round.is_like_model_error {
-            (FAILED_SHARE * is_new, unknown)
-        } else {
-            (is_new, unknown)
-        };
+        let kept = kept_share(round, unnamed, is_new);
+        let unknown = if unnamed { unknown + failed } else { unknown };
         let mut hypotheses: Vec<Hypothesis> = round
             .fitted
             .iter()
@@ -192,6 +187,16 @@ fn are_same(known: &Hypothesis, other: &Hypothesis, section: &Section) -> bool {
     known.physics == other.physics && (known.location == other.location || is_one)
 }
 
+/// Share of its probability that a candidate of a search keeps. `unnamed` tells whether something without a name is
+/// accepted, `is_new` how probably what is left is something new.
+const fn kept_share(round: &Round, unnamed: bool, is_new: f64) -> f64 {
+    match (unnamed, round.is_like_model_error) {
+        (true, _) => FAILED_SHARE,
+        (false, true) => FAILED_SHARE * is_new,
+        (false, false) => is_new,
+    }
+}
+
 /// Kinds that are similar to unknown physics, although none of them predicts withheld speeds better.
 fn nearest(round: &Round) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
@@ -209,6 +214,15 @@ mod tests {
     use super::*;
     use crate::outcome::Location;
     use tracktwin_parameters::TrackDesign;
+
+    #[test]
+    fn what_errors_of_the_model_reach_keeps_a_tenth_of_its_probability() {
+        let like_error = Round { is_like_model_error: true, ..Round::default() };
+        assert_eq!(kept_share(&like_error, false, 1.0), FAILED_SHARE);
+        assert_eq!(kept_share(&Round::default(), false, 1.0), 1.0);
+        // A tenth at least, if something without a name is accepted.
+        assert_eq!(kept_share(&like_error, true, 1.0), FAILED_SHARE);
+    }
 
     #[test]
     fn two_joints_within_a_spacing_are_one_and_two_hanging_sleepers_are_not() {

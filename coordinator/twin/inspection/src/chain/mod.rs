@@ -45,4 +45,6 @@ pub fn noise_floors(recording: &Recording) -> Vec<Option<f64>> {
 #[cfg(test)]
 mod contact_tests;
 #[cfg(test)]
+mod hum_tests;
+#[cfg(test)]
 mod tests;
