@@ -30,8 +30,7 @@ pub(super) const KIND: Kind = Kind {
     look_alikes: &["missing_railpad", "sleeper_bolt", "support_variation"],
     would_separate: "a hammer test of the sleeper's end: a crack lowers its bending resonances",
     screening: Screening::tried(&[Family::new(
-        // A crack is a defect of one sleeper; two neighbours are two findings.
-        Places::Sleepers,
+        Places::SleepersAndPairs,
         &["bending_factor"],
         Trials::Grid(&[&[4e-2, 0.2]]),
     )
