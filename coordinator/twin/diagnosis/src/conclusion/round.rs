@@ -220,7 +220,7 @@ mod tests {
         let like_error = Round { is_like_model_error: true, ..Round::default() };
         assert_eq!(kept_share(&like_error, false, 1.0), FAILED_SHARE);
         assert_eq!(kept_share(&Round::default(), false, 1.0), 1.0);
-        // A tenth at least, if something without a name is accepted.
+        // No less beside something without a name, which takes the rest.
         assert_eq!(kept_share(&like_error, true, 1.0), FAILED_SHARE);
     }
 

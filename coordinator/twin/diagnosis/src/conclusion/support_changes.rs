@@ -37,7 +37,10 @@ pub(crate) fn further(
 ) -> String {
     let changes: Vec<String> = support_changes.iter().map(FoundSupportChange::summary).collect();
     let changes = (!changes.is_empty()).then(|| {
-        format!(" The ballast stiffness changes along the track: {}.", changes.join("; "))
+        format!(
+            " Probable changes of the ballast stiffness along the track: {}.",
+            changes.join("; ")
+        )
     });
     let lost = lost.map(|lost| {
         let [from_m, to_m] = lost.reach_m();
@@ -61,8 +64,8 @@ mod tests {
         let found = [step, spot].map(|change| {
             FoundSupportChange::new(change, amplitude, |sleeper| format!("SN{sleeper}"))
         });
-        let expected = " The ballast stiffness changes along the track: transition from SN19 to SN20, -42 % (94 %); soft \
-                        spot from SN26 to SN29, -42 % (94 %).";
+        let expected = " Probable changes of the ballast stiffness along the track: transition from SN19 to SN20, -42 % \
+                        (probability 94 %); soft spot from SN26 to SN29, -42 % (probability 94 %).";
         assert_eq!(further(&found, None), expected);
         assert_eq!(further(&[], None), "");
     }

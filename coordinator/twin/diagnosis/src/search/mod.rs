@@ -312,11 +312,8 @@ impl SearchOutcome {
             (round, ports) =
                 setting.round(&problem, &self.last, all, threshold, &hopeless, progress)?;
         }
-        round.is_like_model_error = round.on_line
-            && round
-                .fitted
-                .first()
-                .is_some_and(|best| best.log_evidence < threshold.of(&best.candidate));
+        round.is_like_model_error =
+            round.fitted.first().is_some_and(|best| threshold.is_like_model_error(best));
         let competitor = self.competing_unknown(&round, &ports, &forward.section);
         if let Some(best) =
             accepted_candidate(&round, competitor.as_ref(), setting.prepared, threshold)

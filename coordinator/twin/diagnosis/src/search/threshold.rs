@@ -1,5 +1,6 @@
 //! Smallest evidence of a candidate, alone or in addition to accepted ones.
 
+use super::Fitted;
 use super::detected_shape::is_detected;
 use super::extent::Extent;
 use super::probability::EVIDENCE_TEMPERING;
@@ -20,10 +21,12 @@ const NEAR_SHAPE_SHARE_MIN: f64 = 1.0;
 /// exist were found beside a true one with 14 to 22 nats.
 const FURTHER_MIN: f64 = 30.0;
 
-/// Smallest log evidence of a first candidate in nats, on a track other than V-Track: of one without a place, and of one
-/// at a place. A local error of the model meets one of many places: on controls of another simulator cracks that did not
-/// exist had 9.6 and 19 nats and predicted the held-out speeds. A layer under all sleepers was named rightly with 16.
+/// Smallest log evidence of a first candidate without a place in nats, on a track other than V-Track. A layer under all
+/// sleepers was named rightly with 16.
 const FIRST_MIN: f64 = 15.0;
+
+/// The same of a first candidate at a place: a local error of the model meets one of many places. On controls of another
+/// simulator cracks that did not exist had 9.6 and 19 nats and predicted the held-out speeds.
 const FIRST_LOCAL_MIN: f64 = 20.0;
 
 /// Smallest log evidence in nats, on a track other than V-Track, of a local shape of the rail that the passes alone do
@@ -65,6 +68,11 @@ impl EvidenceThreshold<'_> {
         let known = self.accepted.iter();
         let beside = known.map(|(known, evidence)| self.share(known, candidate) * evidence);
         beside.fold(alone, f64::max)
+    }
+
+    /// Whether a candidate on a track other than V-Track has no more evidence than errors of its model reach.
+    pub(super) fn is_like_model_error(self, fitted: &Fitted) -> bool {
+        !self.section.is_v_track() && fitted.log_evidence < self.of(&fitted.candidate)
     }
 
     /// Whether a candidate is a local shape of the rail that the passes alone do not show.

@@ -143,7 +143,10 @@ impl FoundSupportChange {
     pub fn summary(&self) -> String {
         let [first, last] = &self.sleepers;
         let (change, sure) = (100.0 * self.change, 100.0 * self.probability);
-        format!("{} from {first} to {last}, {change:+.0} % ({sure:.0} %)", self.kind.name())
+        format!(
+            "{} from {first} to {last}, {change:+.0} % (probability {sure:.0} %)",
+            self.kind.name()
+        )
     }
 }
 
@@ -265,6 +268,12 @@ mod tests {
         // Both sections see it, and differ by a sleeper where the middle between them lies.
         assert_eq!(stated(&[(0, step(22)), (1, step(21))]), [recorded(step(22))]);
         assert_eq!(stated(&[(0, step(21)), (1, step(22))]), [recorded(step(21))]);
+        // The long one is given up for the first step, which is no reason to give up the second one, too.
+        let long = SupportChange::Transition { before: 20, after: 24 };
+        assert_eq!(
+            stated(&[(0, step(20)), (0, step(23)), (1, long)]),
+            [recorded(step(20)), recorded(step(23))]
+        );
         // The second section lies deeper around it and does not see it.
         assert_eq!(stated(&[(0, step(23))]), []);
         assert_eq!(

@@ -185,7 +185,7 @@ fn are_alike(lines: &[&SpeedLine]) -> bool {
 struct Speed {
     passes: Vec<PassSpectra>,
     /// What each pass has beside the mean of the others at the same positions: the surface and the track
-    /// cancel, the mains do not. Empty for a single pass.
+    /// cancel, the mains do not. Empty for a single pass or a single speed.
     differences: Vec<PassSpectra>,
 }
 
@@ -203,17 +203,15 @@ struct SpeedLine {
 impl Speed {
     fn of(recording: &Recording, group: &[usize], compare: bool) -> Self {
         let pass = |index: usize| &recording.passes[index];
-        let others = |index: usize| {
+        let own = |&index: &usize| PassSpectra::new(pass(index).signal.samples(), pass(index));
+        let beside_others = |&index: &usize| {
             let others = group.iter().filter(|&&other| other != index).map(|&other| pass(other));
-            others.collect::<Vec<_>>()
+            difference(pass(index), others)
         };
-        let compared = group.iter().filter(|_| compare);
-        let spectra = |&index: &usize| PassSpectra::new(pass(index).signal.samples(), pass(index));
+        let compared = if compare { group } else { &[] };
         Self {
-            passes: group.iter().map(spectra).collect(),
-            differences: compared
-                .filter_map(|&index| difference(pass(index), &others(index)))
-                .collect(),
+            passes: group.iter().map(own).collect(),
+            differences: compared.iter().filter_map(beside_others).collect(),
         }
     }
 
@@ -246,29 +244,25 @@ impl Speed {
         let test = |tones: &[Tone]| (mean(tones, |tone| tone.ln_p), mean(tones, |tone| tone.ratio));
         let (ln_p, ratio) = test(&passes);
         let amplitude = [mean(&passes, |tone| tone.amplitude); 2];
+        let mut line = SpeedLine { passes, ratio, amplitude, ln_p, tries };
         if differences.is_empty() {
-            return Some(SpeedLine { passes, ratio, amplitude, ln_p, tries });
+            return Some(line);
         }
-        let (ln_p_there, ratio_there) = test(&differences);
-        if ln_p <= ln_p_there {
-            return Some(SpeedLine { passes, ratio, amplitude, ln_p: bonferroni(ln_p, 2), tries });
+        let (ln_p, ratio) = test(&differences);
+        if ln_p < line.ln_p {
+            // Two equal tones differ by twice their amplitude at most. What the passes share adds to it.
+            let least = 0.5 * mean(&differences, Tone::amplitude_without_background);
+            let largest = line.passes.iter().map(|tone| tone.amplitude).fold(0.0, f64::max);
+            (line.ln_p, line.ratio, line.amplitude) = (ln_p, ratio, [least, largest]);
         }
-        // Two equal tones differ by twice their amplitude at most. What the passes share adds to it.
-        let least = 0.5 * mean(&differences, Tone::amplitude_without_background);
-        let largest = passes.iter().map(|tone| tone.amplitude).fold(0.0, f64::max);
-        Some(SpeedLine {
-            passes,
-            ratio: ratio_there,
-            amplitude: [least, largest],
-            ln_p: bonferroni(ln_p_there, 2),
-            tries,
-        })
+        line.ln_p = bonferroni(line.ln_p, 2);
+        Some(line)
     }
 }
 
 /// What a pass has beside the mean of other passes at the same positions. `None` without another pass that covers
 /// most of this one.
-fn difference(pass: &Pass, others: &[&Pass]) -> Option<PassSpectra> {
+fn difference<'a>(pass: &Pass, others: impl Iterator<Item = &'a Pass>) -> Option<PassSpectra> {
     let own = &pass.position_m;
     let covered = |other: &Pass| {
         let places = &other.position_m;
@@ -278,7 +272,7 @@ fn difference(pass: &Pass, others: &[&Pass]) -> Option<PassSpectra> {
     let is_whole = |other: &&Pass| {
         other.position_m.len() > 1 && covered(other).len() as f64 >= COVERED * own.len() as f64
     };
-    let others: Vec<&Pass> = others.iter().copied().filter(is_whole).collect();
+    let others: Vec<&Pass> = others.filter(is_whole).collect();
     let common = others
         .iter()
         .copied()
