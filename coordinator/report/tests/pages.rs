@@ -42,6 +42,7 @@ fn recording() -> Recording {
             speed_km_h: 13.0,
             signal,
             position_m,
+            axle: None,
             contact_loss_share: None,
         }],
         sleepers,

@@ -194,7 +194,7 @@ fn passes(recording: &Recording, inspection: &Inspection) -> Vec<Vec<String>> {
             significant((square / samples.len() as f64).sqrt(), 3),
             significant(peak, 3),
             noise,
-            gain.map_or_else(|| "–".to_owned(), |gain| format!("{:+.2}", gain.gain_db.0)),
+            gain.map_or_else(|| "–".to_owned(), |gain| format!("{:+.2}", gain.level.mean_db.0)),
         ]);
     }
     rows

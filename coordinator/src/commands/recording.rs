@@ -2,6 +2,7 @@
 
 use clap::Args;
 use std::path::{Path, PathBuf};
+use tracktwin_inspection::chain::with_equal_axles;
 use tracktwin_signal::recording::{Recording, RecordingError, Selection};
 
 /// The argument that names a recording, and its channel.
@@ -26,10 +27,11 @@ pub(super) struct Channel {
 }
 
 impl Channel {
-    /// Reads the passes of this channel of the recording in a folder.
+    /// Reads the passes of this channel of the recording in a folder. Of several axles, the sensors get one
+    /// sensitivity.
     pub(super) fn open(&self, folder: &Path) -> Result<Recording, RecordingError> {
         let selection = Selection { rail: self.rail.clone(), axle: self.axle.clone() };
-        Recording::open_selected(folder, &selection)
+        Recording::open_selected(folder, &selection).map(with_equal_axles)
     }
 }
 

@@ -92,6 +92,7 @@ mod tests {
         let pass = |(number, speed_km_h): (usize, &f64)| Pass {
             file: number.to_string(),
             speed_km_h: *speed_km_h,
+            axle: None,
             signal: Signal::new(1e3, vec![0.0; 8]).unwrap(),
             position_m: vec![0.0; 8],
             contact_loss_share: None,

@@ -256,6 +256,7 @@ mod tests {
             passes: vec![Pass {
                 file: String::new(),
                 speed_km_h: 80.0,
+                axle: None,
                 signal: Signal::new(1e3, vec![0.0, sample]).unwrap(),
                 position_m: vec![0.0, 1.0],
                 contact_loss_share: None,

@@ -59,7 +59,14 @@ impl Sensor {
         self.wander(&mut position_m, &mut random);
         let signal = Signal::new(sample_rate_hz(record.time_step_s), samples)?;
         let contact_loss_share = Some(record.contact_loss_share(first));
-        Ok(Pass { file: String::new(), speed_km_h, signal, position_m, contact_loss_share })
+        Ok(Pass {
+            file: String::new(),
+            speed_km_h,
+            axle: None,
+            signal,
+            position_m,
+            contact_loss_share,
+        })
     }
 
     fn add_noise(&self, samples: &mut [f64], random: &mut impl Rng) -> Result<(), Stop> {

@@ -91,6 +91,7 @@ pub(super) fn record(
             recording.passes.push(Pass {
                 file: format!("simulated at {speed_km_h} km/h"),
                 speed_km_h,
+                axle: None,
                 signal: Signal::new(recording.sample_rate_hz, samples)?,
                 position_m: (first..count).map(position).collect(),
                 contact_loss_share: None,

@@ -57,6 +57,7 @@ pub(crate) fn long_recording(level: f64, speeds_km_h: &[f64], sleepers: u32) -> 
         Pass {
             file: format!("pass-{number}"),
             speed_km_h,
+            axle: None,
             signal: noise(seed, samples, level, 0.5),
             position_m: (0..samples).map(|index| index as f64 * step_m).collect(),
             contact_loss_share: None,

@@ -83,6 +83,7 @@ fn one_pass(
     Ok(Pass {
         file: String::new(),
         speed_km_h,
+        axle: None,
         signal,
         position_m: measured.position_m,
         contact_loss_share: None,

@@ -178,6 +178,7 @@ fn recorded(record: time::PassRecord, speed_km_h: f64) -> Result<Pass, Error> {
     Ok(Pass {
         file: format!("{speed_km_h} km/h"),
         speed_km_h,
+        axle: None,
         signal,
         position_m,
         contact_loss_share: None,

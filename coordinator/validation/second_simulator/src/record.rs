@@ -54,7 +54,7 @@ pub fn simulate(scene: &Scene) -> Result<Recording, TruthError> {
             .map_err(|_| TruthError::Diverged { position_m: scene.recorded_m[0] })?;
         let speed_km_h = scene.passes[index].speed_km_h;
         let file = String::new();
-        Ok(Pass { file, speed_km_h, signal, position_m, contact_loss_share: None })
+        Ok(Pass { file, speed_km_h, axle: None, signal, position_m, contact_loss_share: None })
     };
     let passes: Result<Vec<Pass>, TruthError> =
         (0..scene.passes.len()).into_par_iter().map(pass).collect();

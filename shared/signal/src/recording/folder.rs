@@ -43,6 +43,8 @@ pub struct Pass {
     pub file: String,
     /// Nominal speed in km/h.
     pub speed_km_h: f64,
+    /// Name of the axle whose axle box was measured. `None` if it is not stated.
+    pub axle: Option<String>,
     /// Vertical axle-box acceleration in m/s2, positive downwards.
     pub signal: Signal,
     /// Position of the wheel along the track in m at every sample. Positions do not decrease.
@@ -230,7 +232,7 @@ impl Recording {
                     file,
                     speed_km_h: pass.speed_km_h,
                     rail: None,
-                    axle: None,
+                    axle: pass.axle.clone(),
                     contact_loss_share: pass.contact_loss_share,
                 })
                 .collect(),
@@ -291,8 +293,8 @@ fn read_pass(
     check::length(path, &position_m, spacing_m)?;
     let signal = Signal::new(sample_rate_hz, columns.acceleration_m_s2)
         .expect("columns are finite and the rate is positive");
-    let PassEntry { file, speed_km_h, contact_loss_share, .. } = entry.clone();
-    Ok((Pass { file, speed_km_h, signal, position_m, contact_loss_share }, step_m))
+    let PassEntry { file, speed_km_h, axle, contact_loss_share, .. } = entry.clone();
+    Ok((Pass { file, speed_km_h, axle, signal, position_m, contact_loss_share }, step_m))
 }
 
 /// Note that the steps of the positions were interpolated.

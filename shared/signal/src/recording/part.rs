@@ -23,6 +23,7 @@ impl Recording {
             Some(Pass {
                 file: pass.file.clone(),
                 speed_km_h: pass.speed_km_h,
+                axle: pass.axle.clone(),
                 signal: Signal::new(pass.signal.sample_rate_hz(), samples).ok()?,
                 position_m: pass.position_m[first..end].to_vec(),
                 contact_loss_share: pass.contact_loss_share,
@@ -53,6 +54,7 @@ mod tests {
         let pass = |metres: usize| Pass {
             file: format!("{metres}.csv"),
             speed_km_h: 80.0,
+            axle: None,
             signal: Signal::new(100.0, (0..8 * metres).map(|it| it as f64).collect()).unwrap(),
             position_m: (0..8 * metres).map(|it| 0.125 * it as f64).collect(),
             contact_loss_share: None,

@@ -63,6 +63,7 @@ mod tests {
         Pass {
             file: "a.csv".to_owned(),
             speed_km_h: 67.0,
+            axle: None,
             signal,
             position_m,
             contact_loss_share: None,

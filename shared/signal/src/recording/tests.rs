@@ -16,7 +16,14 @@ fn recording() -> Recording {
         let position_m: Vec<f64> = (0..1800).map(|i| f64::from(i) * step_m).collect();
         let samples = position_m.iter().map(|x| (number * 200.0 * x).sin()).collect();
         let signal = Signal::new(RATE_HZ, samples).unwrap();
-        Pass { file: String::new(), speed_km_h: 10.0, signal, position_m, contact_loss_share: None }
+        Pass {
+            file: String::new(),
+            speed_km_h: 10.0,
+            axle: None,
+            signal,
+            position_m,
+            contact_loss_share: None,
+        }
     };
     let sleeper = |(id, x_m): (&str, f64)| Sleeper { id: id.to_owned(), x_m };
     let nominal = json!({"sleeper": {"spacing_m": 0.125}});

@@ -121,6 +121,7 @@ fn recording() -> Recording {
             speed_km_h: 13.0,
             signal: axle_box(samples),
             position_m: (0..samples).map(|i| i as f64 * speed_m_s / RATE_HZ).collect(),
+            axle: None,
             contact_loss_share: None,
         }],
         sleepers: (0..SLEEPERS).map(|i| Sleeper { id: format!("S{i}"), x_m: place(i) }).collect(),

@@ -24,11 +24,6 @@ impl<'a> Energy<'a> {
         Self { position_m: &pass.position_m, summed }
     }
 
-    /// First and last position of the pass in m.
-    pub(crate) fn ends(&self) -> [f64; 2] {
-        [self.position_m[0], self.position_m[self.position_m.len() - 1]]
-    }
-
     /// Mean power between two positions in m; zero if the pass has no sample there.
     pub(crate) fn mean(&self, from_m: f64, to_m: f64) -> f64 {
         let [start, end] =

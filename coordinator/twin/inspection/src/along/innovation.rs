@@ -101,7 +101,14 @@ mod tests {
     fn pass(samples: Vec<f64>) -> Pass {
         let position_m = (0..samples.len()).map(|index| 1e-3 * index as f64).collect();
         let signal = Signal::new(1e4, samples).unwrap();
-        Pass { file: String::new(), speed_km_h: 36.0, signal, position_m, contact_loss_share: None }
+        Pass {
+            file: String::new(),
+            speed_km_h: 36.0,
+            signal,
+            position_m,
+            axle: None,
+            contact_loss_share: None,
+        }
     }
 
     #[test]

@@ -58,7 +58,14 @@ impl Rolled<'_> {
             let mut position_m: Vec<f64> = (0..count).map(|i| i as f64 * step).collect();
             (self.chain)(index, &mut samples, &mut position_m);
             let signal = Signal::new(Self::RATE_HZ, samples).unwrap();
-            Pass { file: String::new(), speed_km_h, signal, position_m, contact_loss_share: None }
+            Pass {
+                file: String::new(),
+                speed_km_h,
+                axle: None,
+                signal,
+                position_m,
+                contact_loss_share: None,
+            }
         };
         let sleeper = |i: usize| Sleeper { id: format!("SN{i}"), x_m: i as f64 * 0.125 };
         Recording {

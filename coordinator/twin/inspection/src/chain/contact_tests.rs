@@ -51,7 +51,7 @@ fn simulated(dip_m: f64, level: f64) -> Recording {
             (0..record.acceleration_m_s2.len()).map(|i| record.position_m(i)).collect();
         let contact_loss_share = Some(record.contact_loss_share(0));
         let signal = Signal::new(1.0 / TIME_STEP_S, record.acceleration_m_s2).unwrap();
-        Pass { file: String::new(), speed_km_h, signal, position_m, contact_loss_share }
+        Pass { file: String::new(), speed_km_h, axle: None, signal, position_m, contact_loss_share }
     };
     let sleeper = |i: usize| Sleeper { id: format!("SN{i}"), x_m: (i + 1) as f64 * SPACING_M };
     Recording {

@@ -1,6 +1,8 @@
 //! Gain errors: passes at one speed that differ by a constant factor.
 
-use crate::along::{Background, Energy, bonferroni, by_speed, ln_student_tail, median, whitened};
+use crate::along::{
+    Background, Energy, bonferroni, by_speed, ln_student_tail, median, speed_m_s, whitened,
+};
 use tracktwin_signal::recording::{Pass, Recording};
 
 /// Bands in Hz whose powers are compared; a gain error is the same in all bands.
@@ -31,23 +33,36 @@ pub struct Gain {
     pub pass: usize,
     /// Number of passes at this speed, including this one.
     pub passes: usize,
-    /// Gain in dB and its standard deviation: the level relative to the median of the other passes at this
-    /// nominal speed, corrected for the difference of the true speeds.
-    pub gain_db: (f64, f64),
+    /// Level relative to the median of the other passes at this nominal speed, corrected for the difference of
+    /// the true speeds.
+    pub level: LevelDifference,
+}
+
+/// Difference of two levels, over all bands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LevelDifference {
+    /// Mean difference in dB and its standard deviation.
+    pub mean_db: (f64, f64),
     /// Largest difference between bands in dB.
     pub spread_db: f64,
     /// Largest difference of a band from all bands in its standard deviations.
     pub spread_deviations: f64,
-    /// Natural logarithm of the probability of such a difference among all passes without a gain error.
+    /// Natural logarithm of the probability of such a difference by chance.
     pub ln_p: f64,
+}
+
+impl LevelDifference {
+    /// Whether it is the same in every band.
+    pub(super) fn is_uniform(&self) -> bool {
+        let is_narrow = self.spread_db < UNIFORM_DB.max(0.2 * self.mean_db.0.abs());
+        is_narrow || self.spread_deviations < BAND_DEVIATIONS
+    }
 }
 
 impl Gain {
     /// Whether this is a gain error: the same in every band, and improbable (`alpha`) otherwise.
     pub fn is_error(&self, alpha: f64) -> bool {
-        let is_narrow = self.spread_db < UNIFORM_DB.max(0.2 * self.gain_db.0.abs());
-        let is_uniform = is_narrow || self.spread_deviations < BAND_DEVIATIONS;
-        is_uniform && self.ln_p <= alpha.ln()
+        self.level.is_uniform() && self.level.ln_p <= alpha.ln()
     }
 }
 
@@ -57,7 +72,7 @@ pub fn gains(recording: &Recording) -> Vec<Gain> {
     let tries = recording.passes.len();
     let mut gains: Vec<Gain> = groups.iter().flat_map(|group| of_speed(recording, group)).collect();
     for gain in &mut gains {
-        gain.ln_p = bonferroni(gain.ln_p, tries);
+        gain.level.ln_p = bonferroni(gain.level.ln_p, tries);
     }
     gains.sort_by_key(|gain| gain.pass);
     gains
@@ -73,12 +88,12 @@ pub(crate) fn of_other_gain(
     let of_group = |group: Vec<usize>| {
         let errors = gains.iter().filter(|gain| group.contains(&gain.pass) && is_error(gain));
         let errors: Vec<&Gain> = errors.collect();
-        let largest = errors.iter().map(|gain| gain.gain_db.0.abs()).fold(0.0, f64::max);
+        let largest = errors.iter().map(|gain| gain.level.mean_db.0.abs()).fold(0.0, f64::max);
         let passes: Vec<usize> = match (errors.is_empty(), group.len()) {
             (true, _) => Vec::new(),
             (false, 2) => group,
             (false, _) => {
-                let is_far = |gain: &&&Gain| gain.gain_db.0.abs() > 0.5 * largest;
+                let is_far = |gain: &&&Gain| gain.level.mean_db.0.abs() > 0.5 * largest;
                 errors.iter().filter(is_far).map(|gain| gain.pass).collect()
             }
         };
@@ -88,38 +103,67 @@ pub(crate) fn of_other_gain(
 }
 
 fn of_speed(recording: &Recording, group: &[usize]) -> Vec<Gain> {
-    let passes: Vec<&Pass> = group.iter().map(|&index| &recording.passes[index]).collect();
-    let Some(background) = Background::of(&passes[0].signal) else { return Vec::new() };
     if group.len() < 2 {
         return Vec::new();
     }
-    // Levels in dB by pass, band and stretch.
-    let level = |pass: &&Pass| levels(recording, pass, &background);
-    let levels: Vec<Vec<Vec<f64>>> = passes.iter().map(level).collect();
+    let Some(levels) = Levels::of(recording, group) else { return Vec::new() };
     let gain = |this: usize| {
-        let others = (0..passes.len()).filter(|&pass| pass != this);
-        let other = median(others.map(|pass| mean_speed(passes[pass])).collect());
-        let faster_db = 10.0 * (mean_speed(passes[this]) / other).log10();
-        let bands: Vec<Vec<f64>> = (0..levels[this].len())
-            .map(|band| differences(&levels, this, band))
-            .map(|band| band.iter().map(|level| level - SPEED_POWER * faster_db).collect())
-            .collect();
-        gain(group, this, &bands, USUAL_DB + SPEED_POWER_UNSURE * faster_db.abs())
+        let others: Vec<usize> = (0..group.len()).filter(|&pass| pass != this).collect();
+        let level = levels.difference(&[this], &others)?;
+        Some(Gain { pass: group[this], passes: group.len(), level })
     };
     (0..group.len()).filter_map(gain).collect()
 }
 
-/// Level of a pass relative to the median of the others, one value per stretch, in dB.
-fn differences(levels: &[Vec<Vec<f64>>], this: usize, band: usize) -> Vec<f64> {
-    let stretches = levels.iter().map(|pass| pass[band].len()).min().unwrap_or(0);
-    let over = |stretch: usize| {
-        let others = (0..levels.len()).filter(|&pass| pass != this);
-        levels[this][band][stretch] - median(others.map(|p| levels[p][band][stretch]).collect())
-    };
-    (0..stretches).map(over).filter(|level| level.is_finite()).collect()
+/// Levels of the passes at one speed, in dB.
+pub(super) struct Levels {
+    /// By pass, band and stretch: the same stretches of all passes.
+    levels: Vec<Vec<Vec<f64>>>,
+    /// Mean speed of each pass in m/s.
+    speeds_m_s: Vec<f64>,
 }
 
-fn gain(group: &[usize], this: usize, bands: &[Vec<f64>], usual_db: f64) -> Option<Gain> {
+impl Levels {
+    /// Levels of the passes with these indices. `None` if the first one is too short or constant.
+    pub(super) fn of(recording: &Recording, passes: &[usize]) -> Option<Self> {
+        let passes: Vec<&Pass> = passes.iter().map(|&index| &recording.passes[index]).collect();
+        let background = Background::of(&passes.first()?.signal)?;
+        let from = passes.iter().map(|pass| pass.position_m[0]).fold(f64::MIN, f64::max);
+        let last = |pass: &&Pass| pass.position_m[pass.position_m.len() - 1];
+        let to = passes.iter().map(last).fold(f64::MAX, f64::min);
+        let of = |pass: &&Pass| levels(pass, &background, [from, to], recording.spacing_m);
+        let speeds_m_s = passes.iter().map(|pass| speed_m_s(pass)).collect();
+        Some(Self { levels: passes.iter().map(of).collect(), speeds_m_s })
+    }
+
+    /// Level of some passes relative to that of others, both the median of their passes, corrected for the difference
+    /// of the true speeds. `None` if the passes share too short a stretch.
+    pub(super) fn difference(&self, some: &[usize], others: &[usize]) -> Option<LevelDifference> {
+        let speed =
+            |passes: &[usize]| median(passes.iter().map(|&it| self.speeds_m_s[it]).collect());
+        let faster_db = 10.0 * (speed(some) / speed(others)).log10();
+        let bands: Vec<Vec<f64>> = (0..self.levels[some[0]].len())
+            .map(|band| self.differences(some, others, band))
+            .map(|band| band.iter().map(|level| level - SPEED_POWER * faster_db).collect())
+            .collect();
+        over_bands(&bands, USUAL_DB + SPEED_POWER_UNSURE * faster_db.abs())
+    }
+
+    /// Differences in dB in a band, one value per stretch.
+    fn differences(&self, some: &[usize], others: &[usize], band: usize) -> Vec<f64> {
+        let over = |stretch: usize| {
+            let level = |passes: &[usize]| {
+                median(passes.iter().map(|&pass| self.levels[pass][band][stretch]).collect())
+            };
+            level(some) - level(others)
+        };
+        let stretches = 0..self.levels[some[0]][band].len();
+        stretches.map(over).filter(|level| level.is_finite()).collect()
+    }
+}
+
+/// Difference over all bands from one value per stretch in each.
+fn over_bands(bands: &[Vec<f64>], usual_db: f64) -> Option<LevelDifference> {
     let count = bands.iter().map(Vec::len).min()?;
     if count < STRETCHES_MIN {
         return None;
@@ -138,17 +182,8 @@ fn gain(group: &[usize], this: usize, bands: &[Vec<f64>], usual_db: f64) -> Opti
     let beyond = (mean.abs() - usual_db) / deviation.max(1e-6);
     // Two-sided.
     let ln_p = (ln_student_tail(count as f64 - 1.0, beyond) + 2f64.ln()).min(0.0);
-    let gain_db = (mean, deviation);
-    let (pass, passes) = (group[this], group.len());
-    let spread_db = ends[1] - ends[0];
-    Some(Gain { pass, passes, gain_db, spread_db, spread_deviations, ln_p })
-}
-
-/// Mean speed of a pass in m/s, from its positions.
-fn mean_speed(pass: &Pass) -> f64 {
-    let last = pass.position_m.len() - 1;
-    let way_m = pass.position_m[last] - pass.position_m[0];
-    way_m * pass.signal.sample_rate_hz() / last as f64
+    let (mean_db, spread_db) = ((mean, deviation), ends[1] - ends[0]);
+    Some(LevelDifference { mean_db, spread_db, spread_deviations, ln_p })
 }
 
 /// Mean and its standard error.
@@ -159,15 +194,18 @@ fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     (mean, (square / (count - 1.0) / count).sqrt())
 }
 
-/// Levels in dB relative to one background, by band and by sleeper spacing along the track.
-fn levels(recording: &Recording, pass: &Pass, background: &Background) -> Vec<Vec<f64>> {
+/// Levels of a pass in dB relative to a background, by band and by sleeper spacing between two positions in m.
+fn levels(
+    pass: &Pass,
+    background: &Background,
+    [from, to]: [f64; 2],
+    spacing: f64,
+) -> Vec<Vec<f64>> {
     let top = HIGH_SHARE * pass.signal.sample_rate_hz();
-    let spacing = recording.spacing_m;
     let band = |[low, high]: [f64; 2]| {
         let white = whitened(&pass.signal, background, [low, high.min(top)]);
         let energy = Energy::new(pass, &white);
-        let [from, to] = energy.ends();
-        let stretches = ((to - from) / spacing).floor() as usize;
+        let stretches = ((to - from) / spacing).max(0.0).floor() as usize;
         let start = |stretch: usize| from + stretch as f64 * spacing;
         // The fading ends stay out.
         (1..stretches.saturating_sub(1))

@@ -4,6 +4,7 @@
 //! also estimates noise, gain and offset of each pass for the track model. A resonance of the sensor
 //! mounting requires the track model and is tested in the diagnosis.
 
+mod axle;
 mod clipping;
 mod contact;
 mod gain;
@@ -16,11 +17,12 @@ mod speed_coherence;
 mod standstill;
 mod usable;
 
+pub use axle::with_equal_axles;
 pub use clipping::{Clipping, clipping};
 pub(crate) use contact::expected_m_s2;
 pub use contact::{LossOfContact, PassLoss, loss_of_contact};
 pub(crate) use gain::of_other_gain;
-pub use gain::{Gain, gains};
+pub use gain::{Gain, LevelDifference, gains};
 pub use hum::{Hum, hum, without_hum};
 pub(crate) use offset::misplaced;
 pub use offset::{Offset, Offsets, offsets};

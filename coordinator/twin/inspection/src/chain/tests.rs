@@ -62,7 +62,7 @@ fn with_ringing(factor: f64) -> Recording {
 #[test]
 fn a_band_that_rings_differently_in_every_pass_does_not_speak_against_a_gain() {
     let found = gains(&with_ringing(0.77));
-    assert!(found[1].spread_db > 0.6, "no test: {found:?}");
+    assert!(found[1].level.spread_db > 0.6, "no test: {found:?}");
     assert!(found[1].is_error(ALPHA) && !found[2].is_error(ALPHA), "{found:?}");
     assert!(gains(&with_ringing(1.0)).iter().all(|gain| !gain.is_error(ALPHA)));
 }
@@ -98,7 +98,7 @@ fn a_pass_with_another_gain_is_told_from_one_with_another_spectrum() {
     });
     let found = gains(&louder);
     // 1.15 is 1.21 dB; the noise of the sensor is a two hundredth of the signal's power.
-    assert!((found[1].gain_db.0 - 1.21).abs() < 0.1 && found[1].is_error(ALPHA), "{found:?}");
+    assert!((found[1].level.mean_db.0 - 1.21).abs() < 0.1 && found[1].is_error(ALPHA), "{found:?}");
     assert!(!found[2].is_error(ALPHA));
     let wrong =
         |recording, gains: &[Gain]| of_other_gain(recording, gains, |gain| gain.is_error(ALPHA));
@@ -107,12 +107,10 @@ fn a_pass_with_another_gain_is_told_from_one_with_another_spectrum() {
     let mut at_one_speed = louder.clone();
     at_one_speed.passes.truncate(4);
     at_one_speed.passes.iter_mut().for_each(|pass| pass.speed_km_h = 13.0);
-    let of = |pass: usize, gain_db: f64| Gain {
-        pass,
-        gain_db: (gain_db, 0.05),
-        spread_db: 0.1,
-        ln_p: -20.0,
-        ..found[1].clone()
+    let of = |pass: usize, gain_db: f64| {
+        let likeness = LevelDifference { spread_db: 0.1, ln_p: -20.0, ..found[1].level.clone() };
+        let level = LevelDifference { mean_db: (gain_db, 0.05), ..likeness };
+        Gain { pass, level, ..found[1] }
     };
     let by_hand = [of(0, -0.4), of(1, 1.21), of(2, -0.4), of(3, -0.4)];
     assert_eq!(wrong(&at_one_speed, &by_hand), [1]);

@@ -74,7 +74,7 @@ pub(super) fn hum_finding(lines: &[Hum], unit: &str) -> Option<Finding> {
 }
 
 pub(super) fn gain_finding(gain: &Gain) -> Finding {
-    let (level, deviation) = gain.gain_db;
+    let (level, deviation) = gain.level.mean_db;
     let factor = 10f64.powf(level / 20.0);
     let which = if gain.passes > 2 {
         ""
@@ -83,14 +83,14 @@ pub(super) fn gain_finding(gain: &Gain) -> Finding {
     };
     Finding {
         physics: GAIN_ERROR.physics,
-        p_value: number::probability(gain.ln_p),
+        p_value: number::probability(gain.level.ln_p),
         place: Place::Everywhere,
         // A decibel is a factor of e^0.115 in amplitude.
         parameters: BTreeMap::from([("factor", (factor, 0.115 * deviation * factor))]),
         evidence: format!(
             "pass {} is {level:+.2} dB (sd {deviation:.2}) from the others at its speed{which}, alike within {:.2} dB in three bands",
             gain.pass + 1,
-            gain.spread_db
+            gain.level.spread_db
         ),
     }
 }

@@ -126,7 +126,14 @@ fn long_pass(amplitude: f64) -> Pass {
         position_m.push(position);
     }
     let signal = Signal::new(RATE_HZ, samples).unwrap();
-    Pass { file: String::new(), speed_km_h: 67.0, signal, position_m, contact_loss_share: None }
+    Pass {
+        file: String::new(),
+        speed_km_h: 67.0,
+        signal,
+        position_m,
+        axle: None,
+        contact_loss_share: None,
+    }
 }
 
 #[test]

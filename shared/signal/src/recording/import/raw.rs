@@ -97,7 +97,7 @@ impl Raw {
             let fault = Fault::Unreadable { reason: error.to_string() };
             RecordingError::new(&self.path, column, fault)
         })?;
-        Ok(Pass { file, speed_km_h, signal, position_m, contact_loss_share: None })
+        Ok(Pass { file, speed_km_h, axle: None, signal, position_m, contact_loss_share: None })
     }
 
     const fn unit_name(&self) -> &'static str {
