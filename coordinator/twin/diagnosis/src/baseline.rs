@@ -1,10 +1,11 @@
 //! The re-tuned baseline: all parameters that are free before the diagnosis reports left-out physics.
 //!
-//! Ballast, railpad and irregularity level are free at every sleeper. The spectrum of the surface and the
-//! gain of every speed are free. The frequency response of the sensor is flat to two per cent. The ends of
-//! the track and the supports beyond the section are unknown. The diagnosis compares every extension with
-//! this baseline.
+//! Ballast, railpad and irregularity level are free at every sleeper, and railpads differ a little in damping. The
+//! spectrum of the surface and the gain of every speed are free. The frequency response of the sensor is flat to two
+//! per cent. The ends of the track and the supports beyond the section are unknown. The diagnosis compares every
+//! extension with this baseline.
 
+use crate::knots::{KNOT_DISTANCE, knots, shares};
 use crate::quantity::{Common, Own, Quantity};
 use crate::section::Section;
 use crate::variation::{Exception, SupportChange, Variation};
@@ -30,6 +31,8 @@ pub struct Unknowns {
     pub exceptions: Vec<Exception>,
     /// Changes of the ballast stiffness along the track in addition to `variation`.
     pub support_changes: Vec<SupportChange>,
+    /// Standard deviation of the logarithm of a sleeper's railpad damping over the common one.
+    pub railpad_damping_deviation: f64,
     /// Mean of each quantity of [`Common`].
     common: [Mean; 3],
     /// Standard deviation of the exponent of the surface's spectrum.
@@ -53,9 +56,6 @@ impl Mean {
     }
 }
 
-/// Distance of knots in the logarithm of the wave number or of the frequency.
-const KNOT_DISTANCE: f64 = 0.35;
-
 /// Prior of logarithms: standard deviations, and lengths in sleepers or of `ln kappa`.
 mod prior {
     /// Variation along the track if it is not estimated from the recording.
@@ -71,6 +71,8 @@ mod prior {
     /// Deviation of the surface spectrum from eq. B.6, and its correlation length in `ln kappa`.
     pub(super) const SPECTRUM: f64 = 0.5;
     pub(super) const SPECTRUM_LENGTH: f64 = 0.7;
+    /// Damping of a sleeper's railpad relative to that of all, before it is estimated from the recording.
+    pub(super) const RAILPAD_DAMPING: f64 = 0.1;
     /// Gain of the passes at one speed relative to the others.
     pub(super) const GAIN: f64 = 0.05;
     /// Power response of the sensor at a frequency, 0.2 dB: accelerometers are flat to 2 % in amplitude,
@@ -119,6 +121,7 @@ impl Unknowns {
             common: Common::ALL.map(|quantity| Mean::of(known, quantity.parameter())),
             slope_deviation: known.slope_deviation,
             variation: prior::VARIATION,
+            railpad_damping_deviation: prior::RAILPAD_DAMPING,
             exceptions: Vec::new(),
             support_changes: Vec::new(),
             response_deviation: if section.is_v_track() {
@@ -131,7 +134,7 @@ impl Unknowns {
 
     /// Number of unknowns.
     pub fn count(&self) -> usize {
-        self.outer().end
+        self.railpad_damping().end
     }
 
     /// Indices of a quantity at all sleepers, in the order of the sleepers.
@@ -208,6 +211,11 @@ impl Unknowns {
     /// sleeper.
     pub fn outer(&self) -> Range<usize> {
         self.ends().end..self.ends().end + self.outer_supports().len()
+    }
+
+    /// Indices of the log ratio of each sleeper's railpad damping to the common one.
+    pub fn railpad_damping(&self) -> Range<usize> {
+        self.outer().end..self.outer().end + self.sleepers
     }
 
     /// Indices of all unknowns beyond the section.
@@ -313,6 +321,9 @@ impl Unknowns {
         for index in self.response() {
             covariance[(index, index)] = self.response_deviation.powi(2);
         }
+        for index in self.railpad_damping() {
+            covariance[(index, index)] = self.railpad_damping_deviation.powi(2);
+        }
         // One of the ends is there, each as probable as the others.
         for index in self.ends() {
             covariance[(index, index)] = 1.0 / ENDS_SPANS.len() as f64;
@@ -352,7 +363,8 @@ impl Unknowns {
         let common = |quantity| values[self.common(quantity)].exp();
         Support {
             railpad_stiffness: own(Own::RailpadStiffness),
-            railpad_damping: common(Common::RailpadDamping),
+            railpad_damping: common(Common::RailpadDamping)
+                * values[self.railpad_damping().start + sleeper].exp(),
             ballast_stiffness: own(Own::BallastStiffness),
             ballast_damping: common(Common::BallastDamping),
             sleeper_bending_stiffness: common(Common::SleeperBendingStiffness),
@@ -377,20 +389,4 @@ impl Unknowns {
         let own = if i == j { independent.powi(2) } else { 0.0 };
         self.mean[field as usize].deviation.powi(2) + together + own
     }
-}
-
-/// Logarithms of equidistant knots that cover a range.
-fn knots(range: Range<f64>) -> Vec<f64> {
-    let (from, to) = (range.start.ln(), range.end.ln());
-    let count = ((to - from) / KNOT_DISTANCE).ceil() as usize + 1;
-    (0..count).map(|knot| from + KNOT_DISTANCE * knot as f64).collect()
-}
-
-/// Knots on both sides of a value, as indices from `first`, with interpolation weights.
-fn shares(knots: &[f64], value: f64, first: usize) -> [(usize, f64); 2] {
-    let last = knots.len() - 1;
-    let place = ((value.ln() - knots[0]) / KNOT_DISTANCE).clamp(0.0, last as f64);
-    let left = (place.floor() as usize).min(last - 1);
-    let share = place - left as f64;
-    [(first + left, 1.0 - share), (first + left + 1, share)]
 }

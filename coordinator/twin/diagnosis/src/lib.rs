@@ -18,6 +18,7 @@ mod forward;
 mod further_wheels;
 mod held_out;
 mod joined;
+mod knots;
 mod null_model;
 mod observation;
 mod outcome;
@@ -64,5 +65,5 @@ pub use signature::signature;
 pub use spectra::{Spectra, SpeedSpectra, are_one_speed};
 pub use variation::{
     Amplitude, BALLAST_ERROR, Exception, FoundSupportChange, Quadratic, SupportChange,
-    SupportChangeKind, Variation, joined_support_changes, learn_variation,
+    SupportChangeKind, Variation, joined_support_changes, learn_railpad_damping, learn_variation,
 };

@@ -32,6 +32,9 @@ const VARIATIONS: [(Quantity, Vary); VARIED] = [
     (Quantity::Common(Common::BallastDamping), |it| it.ballast_damping *= 1.0 + STEP),
 ];
 
+/// Place of the railpad's damping in [`VARIATIONS`]; each sleeper's own ratio varies it, too.
+const RAILPAD_DAMPING: usize = 3;
+
 /// A prediction with its derivatives with respect to the baseline's unknowns.
 pub struct Linearised {
     /// Predicted log powers.
@@ -258,7 +261,10 @@ impl Forward {
         for (in_track, compared) in self.near(sleeper) {
             let columns = VARIATIONS.map(|(quantity, _)| unknowns.of(quantity, compared));
             let changes = supports.at(in_track, sleeper, row % self.per_sleeper());
-            derivatives.extend(columns.into_iter().zip(changes.map(|c| scale * c / total)));
+            let changes = changes.map(|change| scale * change / total);
+            derivatives.extend(columns.into_iter().zip(changes));
+            let damping = unknowns.railpad_damping().start + compared;
+            derivatives.push((damping, changes[RAILPAD_DAMPING]));
         }
         (log_power, derivatives)
     }
@@ -356,8 +362,9 @@ mod tests {
         let unknowns = &forward.unknowns;
         let supports =
             [Own::BallastStiffness, Own::RailpadStiffness].map(|quantity| unknowns.at(quantity, 1));
-        let others = unknowns.level().chain(unknowns.spectrum().start..unknowns.count());
-        for unknown in supports.into_iter().chain(others) {
+        let others = unknowns.level().chain(unknowns.spectrum().start..unknowns.outer().end);
+        let damping = unknowns.railpad_damping().start + 1;
+        for unknown in supports.into_iter().chain(others).chain([damping]) {
             let [below, above] = [-step, step].map(|change| {
                 let mut varied = values.clone();
                 varied[unknown] += change;

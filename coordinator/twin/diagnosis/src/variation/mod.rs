@@ -3,12 +3,14 @@
 mod change;
 mod learn;
 mod quadratic;
+mod railpad_damping;
 
 pub use change::{
     Amplitude, BALLAST_ERROR, FoundSupportChange, SupportChangeKind, joined_support_changes,
 };
 pub use learn::learn_variation;
 pub use quadratic::Quadratic;
+pub use railpad_damping::learn_railpad_damping;
 
 use crate::quantity::Own;
 use nalgebra::DVector;
