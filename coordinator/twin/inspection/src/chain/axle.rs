@@ -1,14 +1,12 @@
 //! Sensitivities of the sensors of several axles, which ride over the same track at the same time.
 
-use super::gain::{LevelDifference, Levels};
+use super::gain::{LevelDifference, Levels, USUAL_DB};
 use crate::along::{by_speed, median};
 use std::collections::BTreeMap;
 use tracktwin_number::significant;
 use tracktwin_signal::Signal;
 use tracktwin_signal::recording::{Pass, Recording};
 
-/// Differences in dB that are usual and need no correction.
-const USUAL_DB: f64 = 0.2;
 /// Largest probability of a difference by chance at which it is corrected.
 const ALPHA: f64 = 0.01;
 
@@ -16,7 +14,7 @@ const ALPHA: f64 = 0.01;
 /// `doubts` for each axle that differs.
 ///
 /// Every axle rolls over the same rail, so a level difference between axles that is the same in every band and at
-/// every speed is a sensitivity. It is measured relative to the first axle, as the median over the speeds. Because
+/// most speeds is a sensitivity. It is measured relative to the first axle, as the median over the speeds. Because
 /// nothing tells which sensor is right, passes are scaled to the mean of all axles in dB. A difference that depends on
 /// the band has another cause, such as the unsprung mass, and is stated only.
 pub fn with_equal_axles(mut recording: Recording) -> Recording {
@@ -58,8 +56,8 @@ pub fn with_equal_axles(mut recording: Recording) -> Recording {
         |(axle, gain_db): (&String, &f64)| format!("axle {axle} {:+.1} dB", gain_db - mean_db);
     let levels: Vec<String> = gains_db.iter().map(of_axle).collect();
     recording.doubts.push(format!(
-        "the sensors differ in sensitivity ({} from their mean, at all speeds and in all bands); the passes were \
-         scaled to the mean, so that levels of the surface are known no better",
+        "the axles differ in level, alike in all bands and at most speeds ({} from their mean): probably their sensors \
+         differ in sensitivity; the passes were scaled to the mean, because nothing tells which sensor is right",
         levels.join(", ")
     ));
     recording

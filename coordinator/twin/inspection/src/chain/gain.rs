@@ -10,7 +10,7 @@ const BANDS_HZ: [[f64; 2]; 3] = [[100.0, 400.0], [400.0, 1200.0], [1200.0, 4000.
 /// Highest frequency as a share of the sample rate.
 const HIGH_SHARE: f64 = 0.4;
 /// Usual difference of two passes in dB.
-const USUAL_DB: f64 = 0.2;
+pub(super) const USUAL_DB: f64 = 0.2;
 /// Exponent of the power as a function of speed, and its uncertainty: surface spectra decrease with the
 /// third or fourth power of the wave number.
 const SPEED_POWER: f64 = 3.0;
