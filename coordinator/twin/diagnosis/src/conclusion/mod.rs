@@ -3,6 +3,7 @@
 mod alone;
 mod finding;
 mod fit;
+mod look_alikes;
 mod nameless;
 mod notes;
 mod place;
@@ -11,20 +12,17 @@ mod speed_disagreement;
 mod support_changes;
 
 pub use self::alone::passes_alone;
+use self::look_alikes::{add_resonator, add_siblings, add_wheel_mode};
 pub(crate) use self::support_changes::further;
 use crate::calibration::CalibrationError;
 use crate::outcome::{Diagnosis, FORMAT, Hypothesis, Location, UNKNOWN, Verdict, meet};
-use crate::port_scan::PortPlace;
 use crate::prepared_recording::PreparedRecording;
 use crate::search::SearchOutcome;
 use crate::sentence::sentence;
-use std::collections::BTreeMap;
 use tracktwin_inspection::Inspection;
 use tracktwin_inspection::chain::PassDefect;
 use tracktwin_signal::recording::Recording;
-use tracktwin_track::extension::{
-    EffectFamily, FLEXIBLE_AXLE_BOX, Kind, LookAlikeGroup, SENSOR_MOUNT_RESONANCE, SUBGRADE_LAYER,
-};
+use tracktwin_track::extension::Kind;
 
 /// Largest probability if no held-out speed could be tested: at a single speed, structure and geometry have
 /// the same effect.
@@ -210,96 +208,6 @@ impl Evidence<'_> {
     }
 }
 
-/// Divides the probability of a rail shape that only the inspection detected among the kinds of its group.
-/// Without a fit the group is more certain than the kind: a rail joint may have a reduced bending
-/// stiffness, or only a dip.
-fn add_siblings(hypotheses: &mut Vec<Hypothesis>, fitted: &[&str]) {
-    let mut siblings = Vec::new();
-    for index in 0..hypotheses.len() {
-        let hypothesis = &hypotheses[index];
-        let kind = Kind::from_name(&hypothesis.physics);
-        let Some(kind) = kind.filter(|it| it.group == LookAlikeGroup::RailDefect) else { continue };
-        let is_sibling = |other: &Hypothesis| {
-            other.physics != hypothesis.physics
-                && Kind::from_name(&other.physics).is_some_and(|it| it.group == kind.group)
-                && meet(other.location.as_ref(), hypothesis.location.as_ref())
-        };
-        let is_fitted = fitted.contains(&kind.physics);
-        if !hypothesis.accepted || is_fitted || hypotheses.iter().any(is_sibling) {
-            continue;
-        }
-        let others = kind.look_alikes.iter().filter_map(|name| Kind::from_name(name));
-        let others: Vec<_> = others.filter(|other| other.group == kind.group).collect();
-        let whole = hypothesis.probability;
-        for other in &others {
-            siblings.push(Hypothesis {
-                physics: other.physics.to_owned(),
-                family: Some(other.family.name().to_owned()),
-                probability: (1.0 - NAMED_SHARE) * whole / others.len() as f64,
-                accepted: false,
-                parameters: BTreeMap::new(),
-                assumed: BTreeMap::new(),
-                look_alikes: names(other),
-                would_separate: other.would_separate.to_owned(),
-                ..hypothesis.clone()
-            });
-        }
-        if !others.is_empty() {
-            hypotheses[index].probability *= NAMED_SHARE;
-        }
-    }
-    hypotheses.extend(siblings);
-}
-
-/// Divides the probability of an accepted flexible axle box, or resonance of the sensor, between it and a mode of the
-/// wheel's disc. All are a mass on a spring between the contact and the sensor, and the catalogue has no mode of the
-/// disc. A name that already shares its probability with the other one keeps it.
-fn add_wheel_mode(hypotheses: &mut Vec<Hypothesis>) {
-    let is_alike = |it: &&mut Hypothesis| {
-        let kinds = [FLEXIBLE_AXLE_BOX.physics, SENSOR_MOUNT_RESONANCE.physics];
-        it.accepted && it.probability > NAMED_SHARE && kinds.contains(&it.physics.as_str())
-    };
-    let Some(named) = hypotheses.iter_mut().find(is_alike) else { return };
-    let mode = Hypothesis {
-        family: Some(EffectFamily::UnknownWheel.name().to_owned()),
-        accepted: false,
-        ..unknown_like(named, &PortPlace::Wheel, 1.0 - NAMED_SHARE)
-    };
-    named.probability *= NAMED_SHARE;
-    hypotheses.push(mode);
-}
-
-/// Divides the probability of an accepted layer under a single sleeper between it and a mass on a spring elsewhere
-/// in the track, which no kind describes: an absorber on the rail has the same signature. A subgrade does not change
-/// from one sleeper to the next, so that the unknown element comes first; the layer stays in the model.
-fn add_resonator(hypotheses: &mut Vec<Hypothesis>, unknown_max: f64) {
-    let is_single = |it: &Hypothesis| {
-        let sleepers = it.location.as_ref().map_or(0, |place| place.sleepers.len());
-        it.accepted && it.physics == SUBGRADE_LAYER.physics && sleepers == 1
-    };
-    let mut added = Vec::new();
-    for layer in hypotheses.iter_mut().filter(|it| is_single(it)) {
-        let mut unknown = unknown_like(layer, &PortPlace::Seats(Vec::new()), NAMED_SHARE);
-        unknown.probability = unknown.probability.min(unknown_max);
-        added.push(unknown);
-        layer.probability *= 1.0 - NAMED_SHARE;
-    }
-    hypotheses.extend(added);
-}
-
-/// Unknown physics that acts as this hypothesis does, with a share of its probability.
-fn unknown_like(named: &Hypothesis, port: &PortPlace, share: f64) -> Hypothesis {
-    Hypothesis {
-        physics: UNKNOWN.to_owned(),
-        probability: share * named.probability,
-        port: Some(port.name().to_owned()),
-        parameters: BTreeMap::new(),
-        assumed: BTreeMap::new(),
-        look_alikes: vec![named.physics.clone()],
-        ..named.clone()
-    }
-}
-
 /// Sets the probability of each hypothesis's family at its location; its members exclude each other there.
 fn add_families(hypotheses: &mut [Hypothesis], most: f64) {
     let all: Vec<_> = hypotheses
@@ -331,47 +239,4 @@ pub(crate) fn verdict(hypotheses: &[Hypothesis]) -> Verdict {
 
 fn names(kind: &Kind) -> Vec<String> {
     kind.look_alikes.iter().map(|&name| name.to_owned()).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn layer(sleepers: &[&str]) -> Hypothesis {
-        let sleepers = sleepers.iter().map(|id| (*id).to_owned()).collect();
-        let place = Location { x_m: [1.0, 1.0], sleepers };
-        Hypothesis { probability: 0.96, ..Hypothesis::accepted("subgrade_layer", Some(place)) }
-    }
-
-    #[test]
-    fn a_resonance_of_the_sensor_may_be_a_mode_of_the_wheel() {
-        let named = |probability| Hypothesis {
-            probability,
-            ..Hypothesis::accepted("sensor_mount_resonance", None)
-        };
-        let mut sure = vec![named(0.97)];
-        add_wheel_mode(&mut sure);
-        let [sensor, mode] = &sure[..] else { panic!("{sure:?}") };
-        assert!((sensor.probability - 0.6305).abs() < 1e-9 && sensor.accepted);
-        assert!((mode.probability - 0.3395).abs() < 1e-9 && !mode.accepted);
-        assert_eq!((mode.physics.as_str(), mode.port.as_deref()), (UNKNOWN, Some("wheel")));
-        // An axle box has its share already.
-        let mut shared = vec![named(0.57)];
-        add_wheel_mode(&mut shared);
-        assert_eq!(shared.len(), 1);
-    }
-
-    #[test]
-    fn a_layer_under_one_sleeper_is_first_of_all_a_mass_on_a_spring() {
-        let mut one = vec![layer(&["SN8"])];
-        add_resonator(&mut one, 0.97);
-        let [layer_again, unknown] = &one[..] else { panic!("{one:?}") };
-        assert!((unknown.probability - 0.624).abs() < 1e-9 && unknown.accepted);
-        assert!((layer_again.probability - 0.336).abs() < 1e-9 && layer_again.accepted);
-        assert_eq!(unknown.physics, UNKNOWN);
-        assert_eq!(unknown.family, layer_again.family);
-        let mut run = vec![layer(&["SN8", "SN9"])];
-        add_resonator(&mut run, 0.97);
-        assert_eq!(run.len(), 1);
-    }
 }
