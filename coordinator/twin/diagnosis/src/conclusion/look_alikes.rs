@@ -10,8 +10,8 @@ use tracktwin_track::extension::{
 
 /// Divides the probability of a rail shape that only the inspection detected among the kinds of its group.
 /// Without a fit the group is more certain than the kind: a rail joint may have a reduced bending
-/// stiffness, or only a dip. Kinds that the search fitted and did not accept are divided with it, unless they have more
-/// than this share.
+/// stiffness, or only a dip. It is divided between it and the kinds that the search fitted and did not accept; if these
+/// are likely, all keep their ratio.
 pub(super) fn add_siblings(hypotheses: &mut Vec<Hypothesis>, fitted: &[&str]) {
     let accepted: Vec<_> = hypotheses.iter().filter(|it| it.accepted).cloned().collect();
     for named in accepted {
@@ -28,7 +28,13 @@ pub(super) fn add_siblings(hypotheses: &mut Vec<Hypothesis>, fitted: &[&str]) {
         let known: Vec<&Hypothesis> = hypotheses.iter().filter(|it| is_sibling(it)).collect();
         let theirs: f64 = known.iter().map(|it| it.probability).sum();
         let whole = named.probability;
-        if known.iter().any(|it| it.accepted) || theirs >= (1.0 - NAMED_SHARE) * whole {
+        if known.iter().any(|it| it.accepted) {
+            continue;
+        }
+        if theirs >= (1.0 - NAMED_SHARE) * whole {
+            for it in hypotheses.iter_mut().filter(|it| **it == named || is_sibling(it)) {
+                it.probability *= whole / (whole + theirs);
+            }
             continue;
         }
         let others = kind.look_alikes.iter().filter_map(|name| Kind::from_name(name));
@@ -164,7 +170,9 @@ mod tests {
         }
         let mut likely = vec![squat.clone(), joint(0.4, 24.9)];
         add_siblings(&mut likely, &[]);
-        assert!(likely[0].probability == 0.97 && likely[1].probability == 0.4);
+        let shares = [&likely[0], &likely[1]].map(|it| it.probability);
+        assert!((shares[0] + shares[1] - 0.97).abs() < 1e-9, "{shares:?}");
+        assert!((shares[0] / shares[1] - 0.97 / 0.4).abs() < 1e-9, "{shares:?}");
         let mut of_a_fit = vec![squat];
         add_siblings(&mut of_a_fit, &["squat"]);
         assert_eq!(of_a_fit.len(), 1);

@@ -23,6 +23,20 @@ pub(super) fn is_detected(
         && detected_shapes_m.iter().any(|&shape_m| section.are_beside(x_m, shape_m))
 }
 
+/// Whether a candidate is a shape of the rail beside one of these stretches in m, but at none of them: the passes
+/// show the shape elsewhere.
+pub(super) fn is_displaced(
+    candidate: &Candidate,
+    section: &Section,
+    detected_shapes_m: &[[f64; 2]],
+) -> bool {
+    let is_at = |[from_m, to_m]: [f64; 2]| {
+        candidate.extension.x_m.is_some_and(|x_m| x_m[0] <= to_m && from_m <= x_m[1])
+    };
+    is_detected(candidate, section, detected_shapes_m)
+        && !detected_shapes_m.iter().any(|&shape_m| is_at(shape_m))
+}
+
 /// Moves a detected shape before better candidates, if the best one is local physics of another kind near it
 /// and the shape has half of its evidence.
 pub(super) fn detected_shape_first(
@@ -81,5 +95,21 @@ mod tests {
         assert_eq!(of(crack_at(11), 20.0, &shown), None);
         assert_eq!(of(crack_at(11), 30.0, &[]), None);
         assert_eq!(of(crack_at(20), 30.0, &shown), None);
+    }
+
+    #[test]
+    fn a_shape_half_a_spacing_beside_the_detected_one_is_displaced() {
+        let (section, all) = section_with_candidates();
+        let squat_m = section.x_m(10);
+        let squat_at = |x_m: f64| {
+            all.iter()
+                .find(|it| it.kind.physics == "squat" && it.extension.x_m == Some([x_m, x_m]))
+                .unwrap()
+        };
+        let shown = [[squat_m - 1e-3, squat_m + 1e-3]];
+        assert!(!is_displaced(squat_at(squat_m), &section, &shown));
+        assert!(is_displaced(squat_at(section.x_m(11)), &section, &shown));
+        // Two spacings away it is another shape.
+        assert!(!is_displaced(squat_at(section.x_m(12)), &section, &shown));
     }
 }

@@ -6,6 +6,7 @@ mod everywhere;
 mod extent;
 mod fit;
 mod limits;
+mod nested;
 mod outlier_starts;
 mod probability;
 mod remainder;
@@ -22,7 +23,7 @@ pub(crate) use probability::{EVIDENCE_TEMPERING, Probabilities};
 
 use self::fit::retuned;
 use self::limits::FALSE_ALARM;
-use self::round::{Setting, accepted_candidate, is_predicted, unknown_is_predicted};
+use self::round::{Setting, accepted_candidate, unknown_is_predicted};
 use self::threshold::EvidenceThreshold;
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
@@ -38,11 +39,6 @@ use nalgebra::{DMatrix, DVector};
 
 /// Largest number of successive searches.
 const EFFECTS_MAX: usize = 6;
-
-/// Share of the best candidate's log evidence from which another candidate may predict a held-out speed;
-/// `NESTED_MAX` is the largest number of these candidates.
-const NESTED_SHARE: f64 = 0.5;
-const NESTED_MAX: usize = 3;
 
 /// A kind without a location whose log evidence in nats is lower is not tested in the next search.
 const HOPELESS: f64 = -100.0;
@@ -335,47 +331,6 @@ impl SearchOutcome {
         }
         self.rounds.push(round);
         Ok(found_another)
-    }
-
-    /// Tests the best candidate on held-out speeds and accepts it if it predicts them better. Returns the
-    /// gain in log density at each speed, in nats.
-    ///
-    /// The candidate that predicts a speed is selected without this speed, among those with nearly the best
-    /// evidence. The gain therefore tests the choice of kind and location as well as the values.
-    fn accept_if_predictive(
-        &mut self,
-        best: &Fitted,
-        fitted: &[Fitted],
-        setting: &Setting<'_>,
-        densities: &mut Vec<Vec<f64>>,
-    ) -> Result<Vec<f64>, CalibrationError> {
-        let with = |fitted: &Fitted| {
-            [&self.accepted[..], std::slice::from_ref(&fitted.candidate)].concat()
-        };
-        let comes_near = |other: &&Fitted| other.log_evidence >= NESTED_SHARE * best.log_evidence;
-        let scores = fitted
-            .iter()
-            .filter(comes_near)
-            .take(NESTED_MAX)
-            .map(|fitted| setting.held_out(&with(fitted), &fitted.calibration.values))
-            .collect::<Result<Vec<_>, _>>()?;
-        let without = &densities[self.accepted.len()];
-        let chosen = |speed: usize| {
-            let at_speed = scores.iter().map(|scores| scores[speed]);
-            at_speed.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
-        };
-        let gains: Vec<f64> = without
-            .iter()
-            .enumerate()
-            .filter_map(|(speed, without)| Some(chosen(speed)?.log_density - without))
-            .collect();
-        if is_predicted(&gains) {
-            self.accepted = with(best);
-            self.last = best.calibration.clone();
-            // The best comes first.
-            densities.push(log_densities(&scores[0]));
-        }
-        Ok(gains)
     }
 
     /// Unknown physics that competes with the best candidate of a search. If extensions were accepted
