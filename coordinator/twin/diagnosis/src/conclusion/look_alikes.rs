@@ -10,8 +10,8 @@ use tracktwin_track::extension::{
 
 /// Divides the probability of a rail shape that only the inspection detected among the kinds of its group.
 /// Without a fit the group is more certain than the kind: a rail joint may have a reduced bending
-/// stiffness, or only a dip. It is divided between it and the kinds that the search fitted and did not accept; if these
-/// are likely, all keep their ratio.
+/// stiffness, or only a dip. If kinds of the group that the search fitted and did not accept have more than their share,
+/// all of them keep their ratio.
 pub(super) fn add_siblings(hypotheses: &mut Vec<Hypothesis>, fitted: &[&str]) {
     let accepted: Vec<_> = hypotheses.iter().filter(|it| it.accepted).cloned().collect();
     for named in accepted {

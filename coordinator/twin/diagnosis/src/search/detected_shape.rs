@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn a_shape_half_a_spacing_beside_the_detected_one_is_displaced() {
+    fn a_shape_a_spacing_beside_the_detected_one_is_displaced() {
         let (section, all) = section_with_candidates();
         let squat_m = section.x_m(10);
         let squat_at = |x_m: f64| {

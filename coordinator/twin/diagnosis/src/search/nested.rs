@@ -1,6 +1,6 @@
 //! Test of a candidate on held-out speeds, nested: the candidate that predicts a speed is selected without this speed.
 
-use super::detected_shape::is_displaced;
+use super::detected_shape::{is_detected, is_displaced};
 use super::round::{Setting, is_predicted};
 use super::{Fitted, SearchOutcome, log_densities};
 use crate::calibration::CalibrationError;
@@ -27,14 +27,13 @@ impl SearchOutcome {
         let with = |fitted: &Fitted| {
             [&self.accepted[..], std::slice::from_ref(&fitted.candidate)].concat()
         };
-        let prepared = setting.prepared;
-        let is_displaced = |it: &Fitted| {
-            let section = &prepared.forward.section;
-            is_displaced(&it.candidate, section, &prepared.detected_shapes_m)
-        };
+        let section = &setting.prepared.forward.section;
+        let shapes_m = &setting.prepared.detected_shapes_m;
+        let is_displaced = |it: &Fitted| is_displaced(&it.candidate, section, shapes_m);
+        let is_shown = is_detected(&best.candidate, section, shapes_m) && !is_displaced(best);
         let comes_near = |other: &&Fitted| {
             other.log_evidence >= NESTED_SHARE * best.log_evidence
-                && (is_displaced(best) || !is_displaced(other))
+                && !(is_shown && is_displaced(other))
         };
         let scores = fitted
             .iter()
