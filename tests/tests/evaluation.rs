@@ -5,7 +5,8 @@
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use system_tests::{run, simulated};
+use system_tests::{COARSE_MODEL, run, simulated};
+use tracktwin_signal::Signal;
 use tracktwin_signal::recording::Recording;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
@@ -155,4 +156,39 @@ fn rails_are_never_mixed_and_one_of_them_is_selected() {
     let passes = |inspection: &Value| inspection["passes"].as_u64().unwrap();
     assert_eq!([passes(&of_rail("left")), passes(&of_rail("right"))], [2, 1]);
     assert!(of_rail("left")["recording"].as_str().unwrap().ends_with(" rail left"));
+}
+
+#[test]
+fn models_do_not_see_a_pass_of_another_gain() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let library = format!("sqlite:{}", path("library.sqlite"));
+    fs::write(path("campaign.toml"), format!("name = \"gain\"\ncases = 200\n{COARSE_MODEL}"))
+        .unwrap();
+    let library = ["--library", &library];
+    let make = ["run", &path("campaign.toml"), "--out", &path("out")];
+    run(PROGRAM, &[&make[..], &library].concat()).succeeded();
+    let ride =
+        ["simulate", "--out", &path("ride"), "--spans", "40", "--speed", "13", "--passes", "4"];
+    run(PROGRAM, &ride).succeeded();
+    let mut recording = Recording::open(folder.path().join("ride")).unwrap();
+    let louder = &mut recording.passes[2];
+    let file = louder.file.clone();
+    let samples = louder.signal.samples().iter().map(|value| 1.5 * value).collect();
+    louder.signal = Signal::new(recording.sample_rate_hz, samples).unwrap();
+    recording.write(folder.path().join("louder")).unwrap();
+    recording.passes.remove(2);
+    recording.write(folder.path().join("without")).unwrap();
+    let evaluated = |name: &str| -> Value {
+        let (ride, out) = (path(name), path(&format!("{name}-result")));
+        let options = ["--method", "gp", "--models", &path("out/models"), "--out", &out];
+        run(PROGRAM, &[&["evaluate", &ride][..], &options, &library].concat());
+        let text = fs::read_to_string(format!("{out}/evaluation.json")).unwrap();
+        serde_json::from_str(&text).unwrap()
+    };
+    let (louder, without) = (evaluated("louder"), evaluated("without"));
+    assert!(louder["sleepers"] == without["sleepers"], "the louder pass was evaluated");
+    let notes = louder["notes"].to_string();
+    assert!(notes.contains(&format!("{file}: not compared with the track")), "{notes}");
+    assert!(!without["notes"].to_string().contains("not compared"), "{without}");
 }

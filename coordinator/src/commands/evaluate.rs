@@ -4,20 +4,22 @@ use super::accepted::{diagnosis_of, with_physics};
 use super::files::{Force, check, make_folder};
 use super::library_url::{open_or_create, open_whole};
 use super::progress::Stages;
-use super::recording::{Channel, RecordingArgument};
+use super::recording::{RecordingArgument, open, usable_with_notes};
 use super::track::TrackOption;
 use super::{OrInput, Stop, print_json, println_stderr, println_stdout};
+use crate::pipeline::compute::compute;
 use crate::pipeline::evaluate::{Evaluator, EvaluatorError};
-use crate::pipeline::invert::InvertingError;
+use crate::pipeline::invert::{InvertingError, shown};
 use crate::pipeline::{self, provenance};
-use anyhow::{Context, anyhow};
+use anyhow::Context;
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use tracktwin_diagnosis::{Diagnosis, check_track};
 use tracktwin_evaluation::{Evaluation, Flag, check_recording};
 use tracktwin_files::{FileName, FilesError, Kind, Output};
-use tracktwin_inspection::chain::{self, LossOfContact};
+use tracktwin_inspection::chain::LossOfContact;
+use tracktwin_inspection::inspect;
 use tracktwin_inversion::Inversion;
 use tracktwin_library::{Library, without_password};
 use tracktwin_parameters::Track;
@@ -227,26 +229,6 @@ fn inversion_summary(inversion: &Inversion, folder: &Path) -> Value {
     })
 }
 
-/// Reads the passes of a channel of the recording in a folder.
-pub(super) fn open(folder: &Path, channel: &Channel) -> Result<Recording, Stop> {
-    let recording = channel.open(folder).or_input()?;
-    check_sleepers(folder, &recording)?;
-    usable(&recording)?;
-    Ok(recording)
-}
-
-/// Returns an error for a recording without sleepers; `folder` is its path.
-pub(super) fn check_sleepers(folder: &Path, recording: &Recording) -> Result<(), Stop> {
-    if recording.sleepers.is_empty() {
-        return Err(Stop::Input(anyhow!(
-            "{}/recording.json: sleepers: the list is empty; add the positions of the sleepers, \
-             or import with --sleeper",
-            folder.display()
-        )));
-    }
-    Ok(())
-}
-
 /// Reads the trained models in a folder.
 pub(super) fn load_models(folder: &Path) -> Result<Trained, Stop> {
     Trained::load(folder)
@@ -281,17 +263,7 @@ pub(super) async fn evaluate(
     let design = evaluator.design_for(&recording);
     check_recording(&recording, &design, &evaluator.set().speeds_km_h).or_input()?;
     make_folder(folder)?;
-    let mut evaluation = evaluator.evaluate(&recording).or_input()?;
-    let outside = evaluation.outside_library.sentences();
-    evaluation
-        .notes
-        .iter()
-        .filter(|note| !outside.contains(note))
-        .for_each(|it| println_stderr(it));
-    evaluation.notes.splice(0..0, notes.into_iter().chain(evaluator.varied_design()));
-    if let Some(lost) = chain::loss_of_contact(&recording) {
-        flag(&mut evaluation, &lost, recording.passes.len());
-    }
+    let mut evaluation = by_models(&recording, &evaluator, notes, diagnosis.is_some())?;
     let mut inversion = None;
     if beside {
         let setting = Setting { diagnosis, library: Some(library) };
@@ -306,6 +278,37 @@ pub(super) async fn evaluate(
     );
     write(&page, &evaluation, inversion.as_ref(), folder, force)?;
     keep(library, &evaluation).await;
+    Ok(evaluation)
+}
+
+/// Evaluation of the usable part of a recording with models. Lines of the mains are subtracted, and passes
+/// of another gain or position than others at their speed are left out. `notes` are stated first; what the
+/// passes alone show is stated unless the recording was diagnosed.
+fn by_models(
+    recording: &Recording,
+    evaluator: &Evaluator,
+    mut notes: Vec<String>,
+    diagnosed: bool,
+) -> Result<Evaluation, Stop> {
+    let inspection = compute(|| inspect(recording));
+    let compared = inspection.comparable(&inspection.without_hum(recording));
+    let mut evaluation = compute(|| evaluator.evaluate(&compared)).or_input()?;
+    notes.extend(evaluator.varied_design());
+    let mut said = evaluation.notes.clone();
+    let outside = evaluation.outside_library.sentences();
+    said.retain(|note| !outside.contains(note));
+    said.extend(inspection.notes_on_not_compared(recording));
+    if !diagnosed {
+        said.extend(shown(&inspection));
+    }
+    for note in &said {
+        println_stderr(note);
+    }
+    notes.extend(said);
+    evaluation.notes = [notes, outside].concat();
+    if let Some(lost) = &inspection.loss_of_contact {
+        flag(&mut evaluation, lost, recording.passes.len());
+    }
     Ok(evaluation)
 }
 
@@ -368,25 +371,6 @@ fn flag(evaluation: &mut Evaluation, lost: &LossOfContact, passes: usize) {
     let line = format!("loss_of_contact: {}", lost.sentence(passes));
     println_stderr(&line);
     evaluation.notes.push(line);
-}
-
-/// The usable part of a recording, and notes on its defects. The notes are also printed.
-fn usable_with_notes(recording: &Recording) -> Result<(Recording, Vec<String>), Stop> {
-    let (recording, left_out) = usable(recording)?;
-    let notes = [recording.doubts.clone(), left_out].concat();
-    for line in &notes {
-        println_stderr(line);
-    }
-    Ok((recording, notes))
-}
-
-/// The recording without unusable passes, and a note for each of them.
-fn usable(recording: &Recording) -> Result<(Recording, Vec<String>), Stop> {
-    let (kept, pass_defects) = chain::usable(recording);
-    if let (true, Some(first)) = (kept.passes.is_empty(), pass_defects.first()) {
-        return Err(Stop::Input(anyhow!("{}: no pass is usable: {first}", recording.name)));
-    }
-    Ok((kept, pass_defects.iter().map(|why| format!("left out: {why}")).collect()))
 }
 
 /// An unreadable library is a failure; models that do not fit are wrong input.

@@ -1,8 +1,10 @@
 //! The recording of a command, and the channel of which it takes the passes.
 
+use super::{OrInput, Stop, println_stderr};
+use anyhow::anyhow;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use tracktwin_inspection::chain::with_equal_axles;
+use tracktwin_inspection::chain::{self, with_equal_axles};
 use tracktwin_signal::recording::{Recording, RecordingError, Selection};
 
 /// The argument that names a recording, and its channel.
@@ -59,4 +61,43 @@ impl RecordingArgument {
         let Channel { rail, axle } = &self.channel;
         format!("{}{}{}", self.recording.display(), option("rail", rail), option("axle", axle))
     }
+}
+
+/// Reads the passes of a channel of the recording in a folder.
+pub(super) fn open(folder: &Path, channel: &Channel) -> Result<Recording, Stop> {
+    let recording = channel.open(folder).or_input()?;
+    check_sleepers(folder, &recording)?;
+    usable(&recording)?;
+    Ok(recording)
+}
+
+/// Returns an error for a recording without sleepers; `folder` is its path.
+pub(super) fn check_sleepers(folder: &Path, recording: &Recording) -> Result<(), Stop> {
+    if recording.sleepers.is_empty() {
+        return Err(Stop::Input(anyhow!(
+            "{}/recording.json: sleepers: the list is empty; add the positions of the sleepers, \
+             or import with --sleeper",
+            folder.display()
+        )));
+    }
+    Ok(())
+}
+
+/// The usable part of a recording, and notes on its defects. The notes are also printed.
+pub(super) fn usable_with_notes(recording: &Recording) -> Result<(Recording, Vec<String>), Stop> {
+    let (recording, left_out) = usable(recording)?;
+    let notes = [recording.doubts.clone(), left_out].concat();
+    for line in &notes {
+        println_stderr(line);
+    }
+    Ok((recording, notes))
+}
+
+/// The recording without unusable passes, and a note for each of them.
+fn usable(recording: &Recording) -> Result<(Recording, Vec<String>), Stop> {
+    let (kept, pass_defects) = chain::usable(recording);
+    if let (true, Some(first)) = (kept.passes.is_empty(), pass_defects.first()) {
+        return Err(Stop::Input(anyhow!("{}: no pass is usable: {first}", recording.name)));
+    }
+    Ok((kept, pass_defects.iter().map(|why| format!("left out: {why}")).collect()))
 }

@@ -1,7 +1,8 @@
 //! `tracktwin stream`: estimates of the track parameters while a pass is recorded.
 
-use super::evaluate::{check_sleepers, load_models};
+use super::evaluate::load_models;
 use super::library_url::LibraryUrl;
+use super::recording::check_sleepers;
 use super::{OrInput, Stop, println_stderr, write_stdout};
 use crate::pipeline::compute::compute;
 use crate::pipeline::evaluate::Evaluator;

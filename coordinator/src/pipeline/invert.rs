@@ -36,8 +36,8 @@ pub enum InvertingError {
 }
 
 /// Evaluates a recording by inversion. The physics that `diagnosis`, a diagnosis of the recording, accepted
-/// is part of the model. `library` stores null simulations and fitted sections. `watch` is called with the current stage and its
-/// completed share (0 to 1).
+/// is part of the model. `library` stores null simulations and fitted sections. `watch` is called with the
+/// current stage and its completed share (0 to 1).
 ///
 /// # Errors
 /// Returns [`InvertingError::Recording`] if the recording is unsuitable. All other errors are failures.
@@ -86,7 +86,7 @@ pub async fn invert(
 
 /// What the passes alone show, and how to take it into account. The remedy for a fault of the measuring chain is
 /// another recording.
-fn shown(inspection: &Inspection) -> Vec<String> {
+pub(crate) fn shown(inspection: &Inspection) -> Vec<String> {
     let mut notes: Vec<String> = inspection.findings.iter().map(Finding::sentence).collect();
     let is_physics = |finding: &Finding| {
         Kind::from_name(finding.physics).is_some_and(|kind| !kind.measuring_chain)

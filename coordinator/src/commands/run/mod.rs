@@ -8,7 +8,7 @@ use super::files::{Force, make_folder};
 use super::library_url::open_or_create;
 use super::numbers::{cores, count};
 use super::progress::{Progress, TrainingBar};
-use super::recording::{Channel, RecordingArgument};
+use super::recording::{self, Channel, RecordingArgument};
 use super::signals::stop_on_signal;
 use super::track::{preset_parser, read};
 use super::{OrInput, Stop, continuity, evaluate, print_json, println_stderr, println_stdout};
@@ -146,7 +146,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     .or_input()?;
     // Check the recording before the simulation.
     let given = arguments.recording.as_deref();
-    let given = given.map(|folder| evaluate::open(folder, &arguments.channel)).transpose()?;
+    let given = given.map(|folder| recording::open(folder, &arguments.channel)).transpose()?;
     if let Some(recording) = &given {
         check(recording, &campaign).or_input()?;
     }

@@ -198,10 +198,11 @@ fn is_saturated(pair: &Offsets, pass_defects: &[PassDefect]) -> bool {
     )
 }
 
-/// Whether two speeds are left without these passes.
+/// Whether two speeds are left without these passes; one of a recording at one speed.
 fn leaves_speeds(recording: &Recording, passes: &[usize]) -> bool {
-    let is_left = |speed: &Vec<usize>| speed.iter().any(|pass| !passes.contains(pass));
-    by_speed(&recording.passes).into_iter().filter(is_left).count() >= 2
+    let speeds = by_speed(&recording.passes);
+    let is_left = |speed: &&Vec<usize>| speed.iter().any(|pass| !passes.contains(pass));
+    speeds.iter().filter(is_left).count() >= speeds.len().min(2)
 }
 
 /// Whether a finding lies on a stretch without contact or at its end, where the landing of the wheel causes
