@@ -7,7 +7,7 @@
 
 use crate::calibration::{Calibration, Problem};
 use crate::candidate::Candidate;
-use crate::null_model::{NullError, NullModel, simulated, without_ends};
+use crate::null_model::{NullError, NullModel, simulated, with_one_wheel};
 use crate::observation::Observation;
 use crate::outcome::{Confirmation, ConfirmedSpeed};
 use crate::prepared_recording::PreparedRecording;
@@ -129,7 +129,7 @@ impl Confirming<'_> {
         let values = &calibration.values;
         let extensions = Problem { forward, observation, candidates }.extensions(values)?;
         let expected = forward.log_power(values, &extensions)?;
-        let quiet = without_ends(forward);
+        let quiet = with_one_wheel(forward);
         let extensions = Problem { forward: &quiet, observation, candidates }.extensions(values)?;
         let surfaces = [CONFIRMING_SURFACES, SEED];
         let share = |done: f64| progress(done / CONFIRMING_SURFACES as f64);

@@ -27,6 +27,9 @@ const CELL_SHARE: f64 = 0.08;
 const PRODUCT_MIN: f64 = 6.0;
 /// Number of steps per cell: neighbouring cells overlap by half.
 const STEPS: usize = 2;
+/// Number of bays on either side, and smallest number of all, that tell what is usual at one place of a bay.
+const BAYS: f64 = 20.0;
+const BAYS_MIN: usize = 8;
 /// Distance on either side, in sleeper spacings, over which the normal power of a cell is determined.
 const NEAR_SPACINGS: f64 = 1.5;
 
@@ -150,6 +153,7 @@ impl Grid {
                 *sum += power[cell] / normal.max(f64::MIN_POSITIVE) / group.len() as f64;
             }
         }
+        self.remove_usual_profile(&mut ratio);
         let shape = shape(&ratio)?;
         // The median of a gamma variable lies below its mean (Wilson and Hilferty).
         let median_over_mean = (1.0 - 1.0 / (9.0 * shape)).powi(3);
@@ -170,6 +174,27 @@ impl Grid {
             energy.mean(middle - 0.5 * self.width_m, middle + 0.5 * self.width_m)
         };
         Some((0..self.count).map(power).collect())
+    }
+
+    /// Divides by what is usual at the same place between two sleepers, where that is above the normal power:
+    /// the rail is stiffer over every sleeper, and on a smooth rail every sleeper is heard.
+    fn remove_usual_profile(&self, ratio: &mut [f64]) {
+        let reach = (BAYS * self.spacing_m / self.step_m) as usize;
+        let phase = |cell: usize| (cell as f64 * self.step_m / self.spacing_m).fract();
+        let is_alike = |one: usize, other: usize| {
+            let apart = (phase(one) - phase(other)).abs();
+            apart.min(1.0 - apart) * self.spacing_m <= 0.5 * self.step_m
+        };
+        let usual = |cell: usize| {
+            let near = cell.saturating_sub(reach)..(cell + reach + 1).min(self.count);
+            let alike = near.filter(|&other| is_alike(cell, other));
+            let alike: Vec<f64> = alike.map(|other| ratio[other]).collect();
+            if alike.len() < BAYS_MIN { 1.0 } else { median(alike).max(1.0) }
+        };
+        let usual: Vec<f64> = (0..self.count).map(usual).collect();
+        for (value, usual) in ratio.iter_mut().zip(usual) {
+            *value /= usual;
+        }
     }
 
     fn around(&self, cell: usize) -> Range<usize> {
