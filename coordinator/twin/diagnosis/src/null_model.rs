@@ -333,6 +333,26 @@ fn windows(section: &Section, pass: &Pass) -> Vec<Option<Range<usize>>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bands::Bands;
+    use tracktwin_parameters::Preset;
+
+    #[test]
+    fn further_wheels_on_both_sides_stay_on_the_track_and_are_heard() {
+        let null = |further_wheels_m: &[f64]| {
+            let mut design = Preset::Concrete60E1.design();
+            design.wheel.further_wheels_m = further_wheels_m.to_vec();
+            let section = Section::new(design, 2, 6.0);
+            let forward = Forward::new(section, Bands::new(200.0, 1000.0), &[60.0], vec![0.0]);
+            let values = NullModel::grid_values(&forward, &forward.unknowns.typical());
+            NullModel::simulate(&forward, &values, 1, 7, &|_| ()).unwrap().differences
+        };
+        let alone = null(&[]);
+        for further in [-2.56, 9.0] {
+            let heard = null(&[further]);
+            let changes = heard[0].iter().zip(&alone[0]).map(|(a, b)| (a - b).abs());
+            assert!(changes.fold(0.0, f64::max) > 0.03, "a wheel at {further} m is not heard");
+        }
+    }
 
     #[test]
     fn drawn_differences_scatter_as_the_covariance_says() {

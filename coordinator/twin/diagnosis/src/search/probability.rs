@@ -10,7 +10,7 @@ use tracktwin_track::extension::{Kind, LookAlikeGroup};
 pub(crate) const EVIDENCE_TEMPERING: f64 = 3.0;
 
 /// The same on a track other than V-Track. Names that do not exist had up to 26 nats there on recordings of another
-/// simulator, as much as weak effects that exist.
+/// simulator, as much as weak effects that exist, with null models of one wheel; no trial has tested those of all wheels.
 const EVIDENCE_TEMPERING_OF_LINE: f64 = 4.5;
 
 /// Increase of the tempering per nat of the greatest evidence: the error of an extension's model grows with

@@ -213,3 +213,33 @@ fn shape(ratio: &[f64]) -> Option<f64> {
     let deviation = (quartile(3) - quartile(1)) / (2.0 * NORMAL_QUARTILE);
     (deviation > 0.0).then(|| 0.5 + 1.0 / deviation.powi(2))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_every_sleeper_does_is_usual_and_a_louder_one_stands_out() {
+        // Sleepers are 25.5 steps apart.
+        let (spacing_m, step_m, count) = (0.6, 0.6 / 25.5, 1000);
+        let kind = ImpactKind::Blows;
+        let grid = Grid { kind, spacing_m, first_m: 0.0, step_m, width_m: 0.048, count, near: 38 };
+        let sleeper = |cell: usize| (cell as f64 / 25.5).round();
+        let is_over_sleeper = |cell: usize| (cell as f64 - 25.5 * sleeper(cell)).abs() < 1.0;
+        let power = |cell: usize| match (is_over_sleeper(cell), sleeper(cell)) {
+            (false, _) => 0.9,
+            (true, 12.0) => 12.0,
+            (true, _) => 3.0,
+        };
+        let mut ratio: Vec<f64> = (0..count).map(power).collect();
+        grid.remove_usual_profile(&mut ratio);
+        for (cell, ratio) in ratio.into_iter().enumerate() {
+            let expected = match (is_over_sleeper(cell), sleeper(cell)) {
+                (false, _) => 0.9,
+                (true, 12.0) => 4.0,
+                (true, _) => 1.0,
+            };
+            assert!((ratio - expected).abs() < 1e-12, "cell {cell}: {ratio}");
+        }
+    }
+}
