@@ -223,14 +223,11 @@ fn plain(forward: &Forward, values: &DVector<f64>) -> DVector<f64> {
 
 /// A forward model for simulated passes: near ends, where all wheels are still on the track, and no noise.
 ///
-/// Further wheels double the small parts of the covariance: what they send through the rail meets the motion of
-/// the first wheel with a phase that differs from place to place.
+/// Further wheels increase the small parts of the covariance (docs/diagnosis.md, section 4): what they send
+/// through the rail meets the motion of the first wheel with a phase that differs from place to place.
 fn with_near_ends(forward: &Forward) -> Forward {
-    let design = &forward.section.track.design;
-    let reach_m =
-        design.wheel.further_wheels_m.iter().fold(0.0, |far: f64, x_m| far.max(x_m.abs()));
-    let further_spans = (reach_m / design.sleeper.spacing_m).ceil() as usize;
-    let mut quiet = forward.with_ends(SPANS_BEYOND + further_spans);
+    let further = forward.section.furthest_wheel().ceil() as usize;
+    let mut quiet = forward.with_ends(SPANS_BEYOND + further);
     quiet.noise_density.fill(0.0);
     quiet
 }

@@ -84,6 +84,13 @@ impl Section {
         self.sleepers - 1 + 2 * self.spans_beyond
     }
 
+    /// Distance of the furthest wheel from the measuring one, in spacings.
+    pub(crate) fn furthest_wheel(&self) -> f64 {
+        let design = &self.track.design;
+        let distances_m = design.wheel.further_wheels_m.iter().map(|ahead_m| ahead_m.abs());
+        distances_m.fold(0.0, f64::max) / design.sleeper.spacing_m
+    }
+
     /// For each sleeper of the whole track, the index of the compared sleeper whose values it takes: its
     /// own, or those of the first or last compared sleeper.
     pub fn compared(&self) -> impl Iterator<Item = usize> + '_ {

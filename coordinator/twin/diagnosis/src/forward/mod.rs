@@ -230,9 +230,7 @@ impl Forward {
     /// Compared sleepers that an effect on a stretch affects, under any wheel of the track description. The
     /// stretch is in spacings from the first compared sleeper.
     pub(crate) fn felt_at(&self, [from, to]: [f64; 2]) -> Range<usize> {
-        let design = &self.section.track.design;
-        let furthest_m = design.wheel.further_wheels_m.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-        let reach = NEIGHBOURS as f64 + furthest_m / design.sleeper.spacing_m;
+        let reach = NEIGHBOURS as f64 + self.section.furthest_wheel();
         let count = self.section.sleepers;
         let first = (from - reach).floor().max(0.0) as usize;
         let end = ((to + reach).ceil().max(0.0) as usize + 1).min(count);
