@@ -16,8 +16,8 @@ use tracktwin_track::extension::Measured;
 use tracktwin_track::model::TrackModel;
 use tracktwin_track::time::PassRecord;
 
-/// Wavelengths of the odometer error in m.
-const WANDER_M: [f64; 4] = [0.6, 1.1, 2.3, 4.7];
+/// Wavelengths of the odometer error in sleeper spacings.
+const WANDER_SPACINGS: [f64; 4] = [4.8, 8.8, 18.4, 37.6];
 
 /// Properties of the measuring chain.
 #[derive(Args)]
@@ -56,7 +56,7 @@ impl Sensor {
         let mut samples = measured.acceleration_m_s2.split_off(first);
         self.add_noise(&mut samples, &mut random)?;
         let mut position_m = measured.position_m.split_off(first);
-        self.wander(&mut position_m, &mut random);
+        self.wander(&mut position_m, model.design().sleeper.spacing_m, &mut random);
         let signal = Signal::new(sample_rate_hz(record.time_step_s), samples)?;
         let contact_loss_share = Some(record.contact_loss_share(first));
         Ok(Pass {
@@ -81,13 +81,13 @@ impl Sensor {
     }
 
     /// Sum of waves with random phases that never exceeds the limit.
-    fn wander(&self, position_m: &mut [f64], random: &mut impl Rng) {
-        let phases = WANDER_M.map(|_| TAU * unit(random.next_u64()));
-        let amplitude_m = self.odometer / WANDER_M.len() as f64;
+    fn wander(&self, position_m: &mut [f64], spacing_m: f64, random: &mut impl Rng) {
+        let phases = WANDER_SPACINGS.map(|_| TAU * unit(random.next_u64()));
+        let amplitude_m = self.odometer / WANDER_SPACINGS.len() as f64;
         for position in position_m {
-            let waves = WANDER_M.iter().zip(phases);
-            let sum: f64 =
-                waves.map(|(length, phase)| (TAU * *position / length + phase).sin()).sum();
+            let waves = WANDER_SPACINGS.iter().zip(phases);
+            let x = *position / spacing_m;
+            let sum: f64 = waves.map(|(length, phase)| (TAU * x / length + phase).sin()).sum();
             *position += amplitude_m * sum;
         }
     }
@@ -108,7 +108,7 @@ mod tests {
         for seed in 0..20 {
             let truth: Vec<f64> = (0..3000).map(|index| f64::from(index) * 1e-3).collect();
             let mut told = truth.clone();
-            sensor.wander(&mut told, &mut ChaCha8Rng::seed_from_u64(seed));
+            sensor.wander(&mut told, 0.125, &mut ChaCha8Rng::seed_from_u64(seed));
             assert!(told.is_sorted_by(|a, b| a < b));
             let most = told.iter().zip(&truth).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             assert!(most <= WANDER.range[1] && most > 0.1 * WANDER.range[1], "{most}");

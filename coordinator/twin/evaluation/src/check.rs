@@ -4,6 +4,7 @@ use crate::Error;
 use crate::speeds;
 use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
+use tracktwin_signal::{Extractor, SAMPLES_A_PERIOD};
 
 /// Compares the track, vehicle, sensor and speeds stated in a recording with those of the models.
 ///
@@ -25,6 +26,15 @@ pub fn check_recording(
         speeds::check(recording, pass.speed_km_h, speeds_km_h)?;
     }
     Ok(())
+}
+
+/// Checks that a sample rate in Hz is high enough for the features of the models.
+///
+/// # Errors
+/// [`Error::Rate`].
+pub(crate) fn check_sample_rate(extractor: &Extractor, rate_hz: f64) -> Result<(), Error> {
+    let highest_hz = rate_hz / SAMPLES_A_PERIOD;
+    extractor.check_rate(rate_hz).map_err(|source| Error::Rate { source, highest_hz })
 }
 
 #[cfg(test)]

@@ -63,9 +63,18 @@ pub enum Error {
         /// Reason.
         source: FeatureError,
     },
-    /// The sample rate of a stream is too low for the features of the models.
-    #[error("recording.json: sample_rate_Hz: {0}")]
-    Rate(FeatureError),
+    /// The sample rate is too low for the features of the models.
+    #[error(
+        "recording.json: sample_rate_Hz: {source}; evaluate without models, or train models of features up to \
+         {} Hz (`highest_hz` in [features] of the campaign)",
+        rounded(*highest_hz, 5)
+    )]
+    Rate {
+        /// Rate of the recording and the lowest that is allowed.
+        source: FeatureError,
+        /// Highest frequency in Hz of features that this rate allows.
+        highest_hz: f64,
+    },
     /// The sample rate of a stream differs from the declared rate.
     #[error(
         "time_s: the samples come at {} Hz, but recording.json states {} Hz in sample_rate_Hz",

@@ -1,5 +1,6 @@
 //! Features of sleepers: the features of a window, averaged over the passes of one speed.
 
+use crate::check::check_sample_rate;
 use crate::speeds::PassSpeed;
 use crate::{Error, Flag, ModelSpeeds};
 use rayon::prelude::*;
@@ -39,13 +40,14 @@ pub struct SpeedFeatures {
 /// Computes the features of every sleeper of the recording; a sleeper that no pass covers has no speeds.
 ///
 /// # Errors
-/// [`Error::UnknownSpeed`] if models for these speeds cannot evaluate a pass; [`Error::Features`] if the
-/// features of a window cannot be computed.
+/// [`Error::Rate`] if the sample rate is too low; [`Error::UnknownSpeed`] if models for these speeds cannot
+/// evaluate a pass; [`Error::Features`] if the features of a window cannot be computed.
 pub fn features(
     recording: &Recording,
     extractor: &Extractor,
     speeds: &ModelSpeeds,
 ) -> Result<Vec<SleeperFeatures>, Error> {
+    check_sample_rate(extractor, recording.sample_rate_hz)?;
     let speed_of_pass = recording
         .passes
         .iter()

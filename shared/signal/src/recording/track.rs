@@ -214,7 +214,7 @@ pub fn compare_designs(found: &TrackDesign, known: &TrackDesign) -> Result<(), O
 /// The content of `nominal` in `recording.json` for a track of this design.
 pub fn nominal(design: &TrackDesign) -> Map<String, Value> {
     let mut nominal = json!({});
-    for quantity in &QUANTITIES {
+    for quantity in QUANTITIES.iter().chain(&FURTHER) {
         let value = json!(quantity.value(design));
         match quantity.part {
             Some(part) => nominal[part][quantity.name] = value,
@@ -288,6 +288,27 @@ mod tests {
         far.sleepers.iter_mut().for_each(|sleeper| sleeper.x_m *= 1.12);
         let far = far.check_track(&TrackDesign::v_track()).unwrap_err().to_string();
         assert_eq!(far, "the sleeper spacing in the recording is 0.14 m, not 0.125 m");
+    }
+
+    #[test]
+    fn a_recording_that_states_a_whole_design_assumes_nothing() {
+        for preset in Preset::ALL {
+            let mut design = preset.design();
+            design.sleeper.section.youngs_modulus_pa *= 1.5;
+            design.rail_damping_s *= 2.0;
+            let spacing_m = design.sleeper.spacing_m;
+            let recording = Recording {
+                nominal: nominal(&design),
+                sleepers: Vec::new(),
+                spacing_m,
+                ..recording()
+            };
+            let StatedTrack { track, assumed, .. } = recording.stated_track();
+            assert_eq!(assumed, Vec::<String>::new(), "{}", preset.name());
+            if *preset != Preset::VTrack {
+                assert_eq!(track.design, design);
+            }
+        }
     }
 
     #[test]

@@ -13,6 +13,7 @@ mod tests;
 
 pub use row::{Evaluated, Outcome, Reason, Row};
 
+use crate::check::check_sample_rate;
 use crate::estimate::check_features;
 use crate::speeds::{PassSpeed, SPEED_TOLERANCE};
 use crate::{Error, ModelSpeeds, SleeperFeatures, Twin};
@@ -69,7 +70,7 @@ impl<'a> Stream<'a> {
         check_features(&twin)?;
         twin.models.belongs_to(&twin.library.library_digest)?;
         let rate_hz = section.sample_rate_hz;
-        twin.extractor.check_rate(rate_hz).map_err(Error::Rate)?;
+        check_sample_rate(twin.extractor, rate_hz)?;
         let speeds_km_h = twin.models.speeds_km_h();
         let slowest_m_s = speeds_km_h.iter().copied().fold(f64::INFINITY, f64::min) / 3.6;
         let fastest_m_s = speeds_km_h.iter().copied().fold(0.0, f64::max) / 3.6;

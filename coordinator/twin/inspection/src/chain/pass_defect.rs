@@ -124,7 +124,7 @@ impl fmt::Display for PassDefect {
             ),
             Self::UnrelatedPasses { passes: [first, second], correlation, low_hz } => write!(
                 f,
-                "passes {} and {}, at one speed: their correlation above {low_hz:.0} Hz is {correlation:.2}; noise, another track, or positions off by more than half a sleeper spacing",
+                "passes {} and {}, at one speed: their correlation above {low_hz:.0} Hz is {correlation:.2}; noise, another track, or positions that are off by more than half a sleeper spacing or wander within one",
                 first + 1,
                 second + 1
             ),
