@@ -134,7 +134,11 @@ impl Evidence<'_> {
 
     /// Probability that nothing is left out, given these hypotheses.
     fn nothing(&self, hypotheses: &[Hypothesis]) -> f64 {
-        let first = self.search.rounds.first().map_or(1.0, |round| round.probabilities().nothing);
+        let first = self
+            .search
+            .rounds
+            .first()
+            .map_or(1.0, |round| round.probabilities().nothing.min(round::chance_max(round)));
         let accepted = hypotheses.iter().filter(|hypothesis| hypothesis.accepted);
         if accepted.clone().next().is_none() {
             // Something without a name is no more certain than unknown physics.

@@ -1,11 +1,12 @@
 //! Hypotheses from the fits of a search.
 
+use super::finding::probability_of;
 use super::{Evidence, FAILED_SHARE, names};
 use crate::behaviour::Behaviour;
 use crate::estimate::Estimate;
 use crate::outcome::{Hypothesis, UNKNOWN, meet};
 use crate::port_scan::UnknownElement;
-use crate::search::{Fitted, Probabilities, Round};
+use crate::search::{EVIDENCE_TEMPERING, Fitted, Probabilities, Round};
 use crate::section::Section;
 use std::collections::BTreeMap;
 use tracktwin_track::extension::{EffectFamily, Kind, LookAlikeGroup};
@@ -14,8 +15,12 @@ use tracktwin_track::extension::{EffectFamily, Kind, LookAlikeGroup};
 const PORT_ALARM: f64 = 0.01;
 
 /// If the probability of nothing is below this, physics is left out even if neither a kind nor something
-/// unknown predicts a speed that was held out. On a line the errors of the track model reach it, too.
+/// unknown predicts a speed that was held out.
 const NOTHING_LEFT: f64 = 0.02;
+
+/// If chance explains a residual less probably than this, and speeds that were held out have it, too, physics is left
+/// out, even if no kind and no unknown element has enough evidence.
+const LIKELY: f64 = 0.5;
 
 /// Probability that a residual in addition to an accepted extension is new physics.
 const REMAINDER_PRIOR: f64 = 0.2;
@@ -32,23 +37,14 @@ const ORDER: &str = "order";
 impl Evidence<'_> {
     /// Hypotheses from the fits of one search.
     pub(super) fn of_round(&self, round: &Round) -> Vec<Hypothesis> {
-        let Probabilities { named, group, unknown, nothing } = round.probabilities();
         // What is left beside a named effect may be its model's error as well as something new.
         let first = self.search.rounds.first().is_some_and(|first| std::ptr::eq(first, round));
         let alone = first && !round.accepted;
         let is_new = if first || round.accepted { 1.0 } else { REMAINDER_PRIOR };
-        let others = group.max(nothing);
-        let is_there = alone && round.unknown_is_predictive();
-        let is_port = is_there && round.port_p_value <= PORT_ALARM && unknown > others;
-        // Something is there, but the names that come near failed on speeds that were held out, or the best,
-        // which predicted them, leaves too much at its place.
-        let failed: f64 = named.iter().map(|probability| (1.0 - FAILED_SHARE) * probability).sum();
         let taken_back = round.fitted.first().filter(|_| round.remainder.is_some());
-        let is_certain =
-            alone && nothing < NOTHING_LEFT && self.prepared.forward.section.is_v_track();
-        let unnamed = !is_port && (is_certain || is_there && taken_back.is_some());
-        let kept = kept_share(round, unnamed, is_new);
-        let unknown = if unnamed { unknown + failed } else { unknown };
+        let named = round.probabilities().named;
+        let Nameless { accepted, like_names, names_failed, probability } = nameless(round, alone);
+        let kept = if names_failed { FAILED_SHARE } else { is_new };
         let mut hypotheses: Vec<Hypothesis> = round
             .fitted
             .iter()
@@ -59,10 +55,9 @@ impl Evidence<'_> {
             })
             .collect();
         if let Some(port) = &round.port {
-            let unknown = unknown * if alone { 1.0 } else { REMAINDER_PRIOR };
-            let mut nameless = self.without_name(port, unknown);
-            nameless.accepted = is_port || unnamed;
-            if unnamed {
+            let mut nameless = self.without_name(port, probability);
+            nameless.accepted = accepted;
+            if like_names {
                 nameless.look_alikes = nearest(round);
             }
             if let Some(family) = self.family_like(round, port).filter(|_| nameless.accepted) {
@@ -187,14 +182,49 @@ fn are_same(known: &Hypothesis, other: &Hypothesis, section: &Section) -> bool {
     known.physics == other.physics && (known.location == other.location || is_one)
 }
 
-/// Share of its probability that a candidate of a search keeps. `unnamed` tells whether something without a name is
-/// accepted, `is_new` how probably what is left is something new.
-const fn kept_share(round: &Round, unnamed: bool, is_new: f64) -> f64 {
-    match (unnamed, round.is_like_model_error) {
-        (true, _) => FAILED_SHARE,
-        (false, true) => FAILED_SHARE * is_new,
-        (false, false) => is_new,
+/// What a search says about physics without a name.
+struct Nameless {
+    /// Whether it is accepted.
+    accepted: bool,
+    /// Whether it is accepted although names come near.
+    like_names: bool,
+    /// Whether these names failed: on speeds that were held out, or because they leave too much at their place.
+    names_failed: bool,
+    /// Its probability.
+    probability: f64,
+}
+
+/// Physics without a name after a search; `alone` tells whether nothing was accepted so far.
+fn nameless(round: &Round, alone: bool) -> Nameless {
+    let Probabilities { named, group, unknown, nothing } = round.probabilities();
+    if !alone {
+        let probability = REMAINDER_PRIOR * unknown;
+        return Nameless { accepted: false, like_names: false, names_failed: false, probability };
     }
+    let is_there = round.unknown_is_predictive();
+    let others = group.max(nothing);
+    let is_port = is_there && round.port_p_value <= PORT_ALARM && unknown > others;
+    let names_failed =
+        !is_port && (nothing < NOTHING_LEFT || is_there && round.remainder.is_some());
+    let chance = chance_max(round);
+    let like_names = names_failed || !is_port && chance < LIKELY;
+    let failed: f64 = named.iter().map(|probability| (1.0 - FAILED_SHARE) * probability).sum();
+    let probability = match (names_failed, like_names) {
+        (true, _) => unknown + failed,
+        (false, true) => unknown + (nothing - chance).max(0.0),
+        (false, false) => unknown,
+    };
+    Nameless { accepted: is_port || like_names, like_names, names_failed, probability }
+}
+
+/// Largest probability that chance explains the residual of the first search: from its p-value, to the power of one
+/// over the tempering of evidence. It is one if the residual does not predict speeds that were held out, or if a
+/// candidate explains it.
+pub(super) fn chance_max(round: &Round) -> f64 {
+    if round.accepted || !round.is_significant() || !round.unknown_is_predictive() {
+        return 1.0;
+    }
+    1.0 - probability_of(round.p_value.powf(1.0 / EVIDENCE_TEMPERING))
 }
 
 /// Kinds that are similar to unknown physics, although none of them predicts withheld speeds better.
@@ -216,12 +246,17 @@ mod tests {
     use tracktwin_parameters::TrackDesign;
 
     #[test]
-    fn what_errors_of_the_model_reach_keeps_a_tenth_of_its_probability() {
-        let like_error = Round { is_like_model_error: true, ..Round::default() };
-        assert_eq!(kept_share(&like_error, false, 1.0), FAILED_SHARE);
-        assert_eq!(kept_share(&Round::default(), false, 1.0), 1.0);
-        // No less beside something without a name, which takes the rest.
-        assert_eq!(kept_share(&like_error, true, 1.0), FAILED_SHARE);
+    fn a_rare_residual_that_held_out_speeds_have_is_no_chance() {
+        let of = |p_value: f64, unknown_gain: [f64; 3]| {
+            chance_max(&Round { p_value, unknown_gain: unknown_gain.to_vec(), ..Round::default() })
+        };
+        let everywhere = [6.0, 5.0, 4.0];
+        assert!(of(1e-10, everywhere) < 0.15);
+        assert!(of(1e-3, everywhere) > 0.8);
+        assert_eq!(of(0.1, everywhere), 1.0);
+        assert_eq!(of(1e-10, [9.0, -2.0, -1.0]), 1.0);
+        let explained = Round { p_value: 1e-10, accepted: true, ..Round::default() };
+        assert_eq!(chance_max(&explained), 1.0);
     }
 
     #[test]

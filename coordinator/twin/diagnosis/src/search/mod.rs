@@ -76,8 +76,6 @@ pub struct Fitted {
 pub struct Round {
     /// Probability of the greatest evidence if nothing is left out.
     pub p_value: f64,
-    /// Whether the track is not V-Track.
-    pub on_line: bool,
     /// Share of the catalogue that would not be detected in this recording.
     pub unseen: f64,
     /// Fitted candidates, the best first.
@@ -96,8 +94,6 @@ pub struct Round {
     pub held_out_gain: Vec<f64>,
     /// Whether the best candidate was accepted.
     pub accepted: bool,
-    /// Whether the best candidate has no more evidence than errors of a line's model reach.
-    pub is_like_model_error: bool,
     /// Evidence in nats for unknown physics in the residual at the best candidate's location, if it led to
     /// the rejection of the candidate.
     pub remainder: Option<f64>,
@@ -308,8 +304,6 @@ impl SearchOutcome {
             (round, ports) =
                 setting.round(&problem, &self.last, all, threshold, &hopeless, progress)?;
         }
-        round.is_like_model_error =
-            round.fitted.first().is_some_and(|best| threshold.is_like_model_error(best));
         let competitor = self.competing_unknown(&round, &ports, &forward.section);
         if let Some(best) =
             accepted_candidate(&round, competitor.as_ref(), setting.prepared, threshold)

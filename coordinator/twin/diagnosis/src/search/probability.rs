@@ -9,10 +9,6 @@ use tracktwin_track::extension::{Kind, LookAlikeGroup};
 /// Divisor of log evidence (tempering): the model is not exact, and its errors are correlated.
 pub(crate) const EVIDENCE_TEMPERING: f64 = 3.0;
 
-/// The same on a track other than V-Track. Names that do not exist had up to 26 nats there on recordings of another
-/// simulator, as much as weak effects that exist, with null models of one wheel; no trial has tested those of all wheels.
-const EVIDENCE_TEMPERING_OF_LINE: f64 = 4.5;
-
 /// Increase of the tempering per nat of the greatest evidence: the error of an extension's model grows with
 /// the extension.
 const INEXACT_SHARE: f64 = 1e-3;
@@ -67,9 +63,8 @@ impl Round {
         let named: Vec<_> = self.fitted.iter().map(of_fitted).collect();
         let is_linear = self.fitted.first().is_some_and(|best| best.candidate.is_linear());
         let explained_share = if is_linear { 1.0 } else { EXPLAINED_SHARE };
-        let tempering = if self.on_line { EVIDENCE_TEMPERING_OF_LINE } else { EVIDENCE_TEMPERING };
         let unknown = unknown.map(|port| port.log_evidence);
-        tempered(tempering, &named, unknown, explained_share, self.unseen)
+        tempered(&named, unknown, explained_share, self.unseen)
     }
 }
 
@@ -95,9 +90,8 @@ pub(super) fn unseen(trials: impl Iterator<Item = (&'static str, [f64; STRENGTHS
 /// `unseen` is the share of all kinds that would not be detected.
 ///
 /// The function weighs groups of look-alikes against each other and against nothing by their best member's
-/// evidence, and then the members of each group. Log evidence is divided by `tempering`.
+/// evidence, and then the members of each group. Log evidence is divided by [`EVIDENCE_TEMPERING`].
 fn tempered(
-    tempering: f64,
     named: &[(f64, LookAlikeGroup)],
     unknown: Option<f64>,
     explained_share: f64,
@@ -105,13 +99,13 @@ fn tempered(
 ) -> Probabilities {
     let prior = (1.0 - NOTHING_PRIOR) / Kind::all().count() as f64;
     let best = named.iter().map(|(evidence, _)| *evidence).fold(f64::NEG_INFINITY, f64::max);
-    let temperature = tempering + INEXACT_SHARE * best.max(0.0);
+    let temperature = EVIDENCE_TEMPERING + INEXACT_SHARE * best.max(0.0);
     let logarithms: Vec<f64> = named
         .iter()
         .map(|&(evidence, group)| {
             let members = || named.iter().filter(move |(_, other)| *other == group);
             let most = members().map(|(evidence, _)| *evidence).fold(f64::NEG_INFINITY, f64::max);
-            let apart = tempering + MEMBER_SHARE * most.max(0.0);
+            let apart = EVIDENCE_TEMPERING + MEMBER_SHARE * most.max(0.0);
             let share = |evidence: f64| ((evidence - most) / apart).exp();
             let all: f64 = members().map(|(evidence, _)| share(*evidence)).sum();
             prior.ln() + most / temperature + (share(evidence) / all).max(f64::MIN_POSITIVE).ln()
@@ -146,26 +140,6 @@ fn tempered(
 mod tests {
     use super::*;
 
-    /// Probabilities on V-Track.
-    fn of(
-        named: &[(f64, LookAlikeGroup)],
-        unknown: Option<f64>,
-        explained_share: f64,
-        unseen: f64,
-    ) -> Probabilities {
-        tempered(EVIDENCE_TEMPERING, named, unknown, explained_share, unseen)
-    }
-
-    #[test]
-    fn on_a_line_evidence_that_model_errors_reach_makes_no_name_sure() {
-        let on_line = |evidence| {
-            tempered(EVIDENCE_TEMPERING_OF_LINE, &apart(&[evidence]), None, 1.0, 0.3).named[0]
-        };
-        assert!(of(&apart(&[26.0]), None, 1.0, 0.3).named[0] > 0.95);
-        assert!(on_line(24.0) < 0.9 && on_line(26.0) < 0.92, "{}", on_line(26.0));
-        assert!(on_line(40.0) > 0.95);
-    }
-
     /// Names of different groups.
     fn apart(evidences: &[f64]) -> Vec<(f64, LookAlikeGroup)> {
         let groups =
@@ -176,39 +150,39 @@ mod tests {
     #[test]
     fn look_alikes_are_less_sure_than_their_group() {
         let alike = [(1000.0, LookAlikeGroup::Support), (960.0, LookAlikeGroup::Support)];
-        let both = of(&alike, None, 1.0, 0.0);
+        let both = tempered(&alike, None, 1.0, 0.0);
         assert!(both.group > 0.999 && both.named[0] > both.named[1]);
         // Forty nats in a thousand: nothing that another void could not turn.
         assert!(both.named[1] > 0.15, "{both:?}");
-        let unlike = of(&apart(&[1000.0, 960.0]), None, 1.0, 0.0);
+        let unlike = tempered(&apart(&[1000.0, 960.0]), None, 1.0, 0.0);
         assert!(unlike.named[1] < 1e-3, "{unlike:?}");
     }
 
     #[test]
     fn of_two_names_far_above_nothing_the_better_one_is_sure() {
         let Probabilities { named, unknown, .. } =
-            of(&apart(&[12_797.0, 1201.0]), Some(600.0), 1.0, 0.3);
+            tempered(&apart(&[12_797.0, 1201.0]), Some(600.0), 1.0, 0.3);
         assert!((named[0] - 1.0).abs() < 1e-12);
         assert!(named[1] < 1e-12 && unknown < 1e-12);
     }
 
     #[test]
     fn look_alikes_a_thousandth_apart_are_both_possible() {
-        let strong = of(&apart(&[10_657.5, 10_647.6]), None, 1.0, 0.0).named;
+        let strong = tempered(&apart(&[10_657.5, 10_647.6]), None, 1.0, 0.0).named;
         assert!(strong[1] > 0.25 && strong[1] < 0.5, "{strong:?}");
-        let weak = of(&apart(&[100.0, 90.1]), None, 1.0, 0.0).named;
+        let weak = tempered(&apart(&[100.0, 90.1]), None, 1.0, 0.0).named;
         assert!(weak[1] < 0.05, "{weak:?}");
     }
 
     #[test]
     fn a_few_nats_leave_something_less_probable_than_nothing() {
-        let something = |evidence| of(&apart(&[evidence]), None, 1.0, 0.3).something();
+        let something = |evidence| tempered(&apart(&[evidence]), None, 1.0, 0.3).something();
         assert!(something(9.0) < 0.5 && something(15.0) > 0.5);
     }
 
     #[test]
     fn without_evidence_a_name_has_its_prior() {
-        let Probabilities { named, unknown, .. } = of(&apart(&[0.0]), None, 1.0, 0.0);
+        let Probabilities { named, unknown, .. } = tempered(&apart(&[0.0]), None, 1.0, 0.0);
         let prior = 0.5 / Kind::all().count() as f64;
         assert!((named[0] - prior / (0.5 + prior)).abs() < 1e-12);
         assert_eq!(unknown, 0.0);
@@ -216,21 +190,21 @@ mod tests {
 
     #[test]
     fn the_unknown_needs_more_evidence_than_a_name() {
-        let equal = of(&apart(&[100.0]), Some(100.0), 1.0, 0.0);
+        let equal = tempered(&apart(&[100.0]), Some(100.0), 1.0, 0.0);
         assert!((equal.unknown / equal.named[0] - UNKNOWN_PRIOR).abs() < 1e-12);
         // What a name explains for the most part is not unknown, if its model is not exact.
-        let more = |unknown| of(&apart(&[100.0]), Some(unknown), EXPLAINED_SHARE, 0.0);
+        let more = |unknown| tempered(&apart(&[100.0]), Some(unknown), EXPLAINED_SHARE, 0.0);
         let [little, much] = [140.0, 160.0].map(more);
         assert!((little.unknown / little.named[0] - UNKNOWN_PRIOR).abs() < 1e-12);
         assert!(much.unknown > much.named[0]);
-        let exact = of(&apart(&[100.0]), Some(140.0), 1.0, 0.0);
+        let exact = tempered(&apart(&[100.0]), Some(140.0), 1.0, 0.0);
         assert!(exact.unknown > exact.named[0]);
     }
 
     #[test]
     fn nothing_is_as_sure_as_what_is_hidden_would_show() {
-        let certain = of(&apart(&[]), None, 1.0, 0.0).nothing;
-        let blind = of(&apart(&[]), None, 1.0, 1.0).nothing;
+        let certain = tempered(&apart(&[]), None, 1.0, 0.0).nothing;
+        let blind = tempered(&apart(&[]), None, 1.0, 1.0).nothing;
         assert_eq!((certain, blind), (1.0, NOTHING_PRIOR));
     }
 

@@ -246,8 +246,7 @@ impl<'a> Setting<'a> {
         });
         // The better of two tests.
         let p_value = floored(2.0 * p_value.min(port_p_value));
-        let on_line = !self.prepared.forward.section.is_v_track();
-        Round { p_value, on_line, port, port_p_value, ..Round::default() }
+        Round { p_value, port, port_p_value, ..Round::default() }
     }
 }
 

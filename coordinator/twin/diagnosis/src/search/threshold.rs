@@ -1,6 +1,5 @@
 //! Smallest evidence of a candidate, alone or in addition to accepted ones.
 
-use super::Fitted;
 use super::detected_shape::is_detected;
 use super::extent::Extent;
 use super::probability::EVIDENCE_TEMPERING;
@@ -15,21 +14,6 @@ const FURTHER_SHARE_MIN: f64 = 0.25;
 
 /// The same near a shape that the passes alone show.
 const NEAR_SHAPE_SHARE_MIN: f64 = 1.0;
-
-/// Smallest log evidence of a candidate in addition to accepted ones, in nats, on a track other than V-Track.
-/// Errors of the track model reach 22 nats there: on four recordings of another simulator, kinds that did not
-/// exist were found beside a true one with 14 to 22 nats.
-const FURTHER_MIN: f64 = 30.0;
-
-/// Smallest log evidence of a first candidate in nats, on a track other than V-Track. On two controls of another
-/// simulator no candidate has any; a missing railpad that exists has 17.
-const FIRST_MIN: f64 = 13.5;
-
-/// Smallest log evidence in nats, on a track other than V-Track, of a local shape of the rail that the passes alone do
-/// not show: it is a random part of the surface rather than a defect. All speeds pass the same surface, so that a
-/// held-out speed does not tell. On recordings of another simulator squats that did not exist had 11 and 15 nats, and
-/// corrugation over one spacing 24.
-const UNSEEN_SHAPE_MIN: f64 = 25.0;
 
 /// Largest ratio of the gain of a fit to that of the best trial with free strength. A candidate that cannot
 /// reach the threshold in addition to an accepted one is not fitted.
@@ -54,25 +38,9 @@ impl EvidenceThreshold<'_> {
         if is_local_shape(candidate) && self.is_detected_by_passes(candidate) {
             return alone;
         }
-        let alone = match (self.section.is_v_track(), self.accepted.is_empty()) {
-            (true, _) => alone,
-            (false, false) => FURTHER_MIN,
-            (false, true) if self.is_unseen_shape(candidate) => UNSEEN_SHAPE_MIN,
-            (false, true) => FIRST_MIN,
-        };
         let known = self.accepted.iter();
         let beside = known.map(|(known, evidence)| self.share(known, candidate) * evidence);
         beside.fold(alone, f64::max)
-    }
-
-    /// Whether a candidate on a track other than V-Track has no more evidence than errors of its model reach.
-    pub(super) fn is_like_model_error(self, fitted: &Fitted) -> bool {
-        !self.section.is_v_track() && fitted.log_evidence < self.of(&fitted.candidate)
-    }
-
-    /// Whether a candidate is a local shape of the rail that the passes alone do not show.
-    fn is_unseen_shape(self, candidate: &Candidate) -> bool {
-        is_local_shape(candidate) && !is_detected(candidate, self.section, self.detected_shapes_m)
     }
 
     fn is_detected_by_passes(self, candidate: &Candidate) -> bool {
@@ -113,42 +81,6 @@ pub(super) fn is_local_shape(candidate: &Candidate) -> bool {
 mod tests {
     use super::*;
     use crate::search::testing::section_with_candidates;
-    use tracktwin_parameters::Preset;
-
-    #[test]
-    fn on_a_line_a_further_candidate_needs_more_than_errors_of_the_track_model_reach() {
-        let (section, all) = section_with_candidates();
-        let line = Section { track: Preset::like(0.6).track(), ..section.clone() };
-        let far_apart = |wanted: &str, sleeper: usize| {
-            let is_it = |candidate: &&Candidate| {
-                candidate.kind.physics == wanted
-                    && candidate.extension.sleepers.as_deref() == Some(&[sleeper])
-            };
-            all.iter().find(is_it).unwrap()
-        };
-        let accepted = [(far_apart("hanging_sleeper", 3).clone(), 100.0)];
-        let further = far_apart("sleeper_bolt", 20);
-        let of = |section: &Section, accepted: &[(Candidate, f64)]| {
-            EvidenceThreshold { accepted, section, detected_shapes_m: &[] }.of(further)
-        };
-        let alone = EVIDENCE_TEMPERING * 20_f64.ln();
-        assert_eq!([of(&section, &[]), of(&section, &accepted)], [alone; 2]);
-        assert_eq!([of(&line, &[]), of(&line, &accepted)], [FIRST_MIN, FURTHER_MIN]);
-    }
-
-    #[test]
-    fn on_a_line_a_squat_that_the_passes_do_not_show_needs_more_evidence() {
-        let (section, all) = section_with_candidates();
-        let line = Section { track: Preset::like(0.6).track(), ..section.clone() };
-        let squat = all.iter().find(|candidate| candidate.kind.physics == "squat").unwrap();
-        let [x_m, _] = squat.extension.x_m.unwrap();
-        let of = |section: &Section, detected_shapes_m: &[[f64; 2]]| {
-            EvidenceThreshold { accepted: &[], section, detected_shapes_m }.of(squat)
-        };
-        let alone = EVIDENCE_TEMPERING * 20_f64.ln();
-        assert_eq!([of(&section, &[]), of(&line, &[[x_m, x_m]])], [alone; 2]);
-        assert_eq!(of(&line, &[]), UNSEEN_SHAPE_MIN);
-    }
 
     #[test]
     fn beside_an_effect_a_candidate_needs_a_quarter_of_what_falls_to_its_place() {
