@@ -17,7 +17,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let library = Library::open(&url).await?;
     let campaigns = library.campaigns().await?;
     let campaign = campaigns.first().ok_or("the library holds no campaign")?;
-    let set = pipeline::train::set(&library, campaign).await?;
+    let set = pipeline::train::set(&library, campaign, None).await?;
     let usual = pipeline::train::options(&set);
     let whole = usual.features[..1].to_vec();
     println!(

@@ -136,7 +136,7 @@ async fn train(
     make_folder(folder)?;
     let bar = TrainingBar::default();
     let watch = |at: tracktwin_surrogate::Progress<'_>| bar.at(&at);
-    let trained = train_into(folder, force, library, campaign, SEED, &watch).await?;
+    let trained = train_into(folder, force, library, campaign, SEED, None, &watch).await?;
     bar.end();
     Ok(trained)
 }
@@ -185,7 +185,7 @@ impl Material {
         models: Option<Trained>,
     ) -> Result<Self, Stop> {
         let Some(models) = models else {
-            let set = pipeline::train::set(library, campaign).await?;
+            let set = pipeline::train::set(library, campaign, None).await?;
             return Ok(Self::Results(Box::new(set)));
         };
         let evaluator = Evaluator::new(models, library).await.map_err(evaluate::stop)?;

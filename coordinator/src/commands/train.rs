@@ -3,11 +3,13 @@
 use super::files::{Force, make_folder};
 use super::library::{CHOOSE_REMEDY, choose};
 use super::library_url::LibraryUrl;
+use super::numbers::number;
 use super::progress::TrainingBar;
 use super::{Stop, print_json, println_stdout};
 use crate::pipeline::models::{check_files, group_name, scores, train_into};
 use clap::Args;
 use std::path::PathBuf;
+use tracktwin_parameters::quantity::FREQUENCY;
 use tracktwin_surrogate::{ModelGroup, ParameterModel, Trained};
 
 /// Arguments of `train`.
@@ -30,6 +32,10 @@ pub(super) struct Arguments {
     /// Id or name of the campaign; required if the library holds several.
     #[arg(long, value_name = "CAMPAIGN")]
     campaign: Option<String>,
+    /// Highest frequency of the features in Hz [default: all features]; a recording of a low sample rate
+    /// needs 0.4 times its rate or less.
+    #[arg(long, value_name = "HZ", value_parser = number(FREQUENCY))]
+    highest: Option<f64>,
     /// Seed that selects the training half of the cases.
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -39,14 +45,16 @@ pub(super) struct Arguments {
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
-    let Arguments { library, out, force: Force { force }, campaign, seed, json } = arguments;
+    let Arguments { library, out, force: Force { force }, campaign, highest, seed, json } =
+        arguments;
     check_files(&out, force)?;
     let library = library.open_whole().await?;
     let campaign = choose(&library, campaign.as_deref(), CHOOSE_REMEDY).await?;
     // Before the training, which takes hours.
     make_folder(&out)?;
     let bar = TrainingBar::default();
-    let trained = train_into(&out, force, &library, &campaign, seed, &|at| bar.at(&at)).await?;
+    let watch = |at: tracktwin_surrogate::Progress<'_>| bar.at(&at);
+    let trained = train_into(&out, force, &library, &campaign, seed, highest, &watch).await?;
     bar.end();
     if json {
         print_json(&scores(&trained));

@@ -52,9 +52,16 @@ impl Evaluator {
     pub async fn new(models: Trained, library: &Library) -> Result<Self, EvaluatorError> {
         let campaign =
             library.campaign(models.campaign()).await.map_err(EvaluatorError::Foreign)?;
-        let set = pipeline::train::set(library, &campaign).await?;
+        let used_hz = models.frequencies_hz();
+        let set = pipeline::train::set(library, &campaign, used_hz.last().copied()).await?;
         let experiment = pipeline::train::experiment(&campaign)?;
-        let extractor = Extractor::new(&experiment.features)?;
+        let features = &experiment.features;
+        let extractor = match used_hz.last() {
+            Some(&highest_hz) if used_hz.len() < features.frequencies_hz().len() => {
+                Extractor::up_to(features, highest_hz)?
+            }
+            _ => Extractor::new(features)?,
+        };
         let fixed = pipeline::train::fixed(&campaign)?;
         Ok(Self { extractor, models, set, by_speeds: BySpeeds::default(), experiment, fixed })
     }

@@ -48,7 +48,7 @@ pub fn check_files(folder: &Path, force: bool) -> Result<(), FilesError> {
 }
 
 /// Trains on a campaign, and saves the models and their errors in `folder`. `seed` determines which half of
-/// the cases is used for training.
+/// the cases is used for training; `highest_hz` limits the frequencies of the features.
 ///
 /// # Errors
 /// Returns [`ModelsError`] if the campaign is unsuitable, the training fails, or a file cannot be written.
@@ -58,9 +58,10 @@ pub async fn train_into(
     library: &Library,
     campaign: &CampaignRecord,
     seed: u64,
+    highest_hz: Option<f64>,
     watch: &dyn Fn(tracktwin_surrogate::Progress<'_>),
 ) -> Result<Trained, ModelsError> {
-    let set = train::set_to_train_on(library, campaign).await?;
+    let set = train::set_to_train_on(library, campaign, highest_hz).await?;
     let mut options = train::options(&set);
     options.seed = seed;
     let (trained, tested) = compute(|| {

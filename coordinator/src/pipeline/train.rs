@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 use tracktwin_experiment::{Experiment, ExperimentError};
 use tracktwin_library::{CampaignRecord, Library, LibraryError};
+use tracktwin_number::rounded;
 use tracktwin_parameters::{Axis, Parameter, ParameterSet, Scale};
 use tracktwin_signal::{FeatureDefinition, FeatureSet};
 use tracktwin_surrogate::ENTRIES_MIN;
@@ -47,6 +48,14 @@ pub enum TrainingError {
         /// Number of finished cases.
         finished: u32,
     },
+    /// No feature is left.
+    #[error("campaign {campaign}: it has no features below {} Hz", rounded(*highest_hz, 5))]
+    NoFeatures {
+        /// Id of the campaign.
+        campaign: String,
+        /// Highest frequency allowed in Hz.
+        highest_hz: f64,
+    },
     /// This version of the program cannot read the campaign's experiment.
     #[error("campaign {campaign}: invalid experiment: {source}")]
     Experiment {
@@ -65,36 +74,43 @@ pub enum TrainingError {
     },
 }
 
-/// Reads all finished cases of a campaign. There must be enough cases for training, and a parameter must
-/// vary.
+/// Reads all finished cases of a campaign, with features up to `highest_hz`. There must be enough cases for
+/// training, and a parameter must vary.
 ///
 /// # Errors
 /// Returns [`TrainingError`]. All checks that do not need the results are made before the results are read.
 pub async fn set_to_train_on(
     library: &Library,
     campaign: &CampaignRecord,
+    highest_hz: Option<f64>,
 ) -> Result<TrainingSet, TrainingError> {
     let finished = library.status(&campaign.id).await?.finished;
     if (finished as usize) < ENTRIES_MIN {
         return Err(TrainingError::TooFew { campaign: campaign.id.clone(), finished });
     }
-    let set = set(library, campaign).await?;
+    if let Some(highest_hz) = highest_hz
+        && features_hz(&experiment(campaign)?, Some(highest_hz)).is_empty()
+    {
+        return Err(TrainingError::NoFeatures { campaign: campaign.id.clone(), highest_hz });
+    }
+    let set = set(library, campaign, highest_hz).await?;
     if set.varied.is_empty() {
         return Err(TrainingError::NothingVaries { campaign: campaign.id.clone() });
     }
     Ok(set)
 }
 
-/// Reads all finished cases of a campaign as a training set.
+/// Reads all finished cases of a campaign as a training set, with features up to `highest_hz`.
 ///
 /// # Errors
 /// Returns [`TrainingError`] if the library cannot be read or the experiment is invalid.
 pub async fn set(
     library: &Library,
     campaign: &CampaignRecord,
+    highest_hz: Option<f64>,
 ) -> Result<TrainingSet, TrainingError> {
     let experiment = experiment(campaign)?;
-    let frequencies_hz = compared_hz(&experiment);
+    let frequencies_hz = features_hz(&experiment, highest_hz);
     let bins = frequencies_hz.len();
     let speeds = campaign.speeds_km_h.len();
     let mut log_power = vec![Vec::new(); speeds];
@@ -133,10 +149,13 @@ pub async fn set(
     })
 }
 
-/// Frequencies in Hz of the bins that models use: all bins of the features. If the contact patch filters the
-/// irregularity: the bins below the waves that it averages out at the lowest speed.
-fn compared_hz(experiment: &Experiment) -> Vec<f64> {
+/// Frequencies in Hz of the bins that models use: all bins of the features up to `highest_hz`. If the contact patch
+/// filters the irregularity: the bins below the waves that it averages out at the lowest speed.
+pub fn features_hz(experiment: &Experiment, highest_hz: Option<f64>) -> Vec<f64> {
     let mut frequencies_hz = experiment.features.frequencies_hz();
+    let highest_hz = highest_hz.unwrap_or(f64::INFINITY);
+    // The last of an earlier selection, which may differ by rounding, is one of them.
+    frequencies_hz.retain(|frequency_hz| *frequency_hz <= highest_hz * (1.0 + 1e-9));
     if experiment.design.contact_patch_filter {
         let patch = ContactPatch::new(&experiment.design);
         let slowest_m_s =

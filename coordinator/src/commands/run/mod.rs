@@ -16,6 +16,7 @@ use crate::commands::contact::contact_sentence;
 use crate::pipeline::evaluate::design_for;
 use crate::pipeline::lack::check_for_training;
 use crate::pipeline::models;
+use crate::pipeline::train::features_hz;
 use anyhow::anyhow;
 use clap::Args;
 use sample::Sample;
@@ -28,6 +29,7 @@ use tracktwin_farm::embedded::Task;
 use tracktwin_library::{Library, Status};
 use tracktwin_parameters::quantity::CASES;
 use tracktwin_parameters::{Preset, Track};
+use tracktwin_signal::SAMPLES_A_PERIOD;
 use tracktwin_signal::recording::Recording;
 
 /// Name of the models' folder inside the output folder.
@@ -232,7 +234,10 @@ async fn chain(
     let folder = out.join(MODELS);
     let bar = TrainingBar::default();
     let watch = |at: tracktwin_surrogate::Progress<'_>| bar.at(&at);
-    let trained = models::train_into(&folder, force.force, library, &record, 0, &watch).await?;
+    let highest_hz = recording.as_ref().map(|it| highest_hz(it, campaign));
+    let (force_all, seed) = (force.force, 0);
+    let trained =
+        models::train_into(&folder, force_all, library, &record, seed, highest_hz, &watch).await?;
     bar.end();
     let evaluation = match recording {
         Some(it) => {
@@ -261,6 +266,20 @@ fn sample_for(campaign: &Campaign, out: &Path, force: Force) -> Result<Option<Re
             Ok(None)
         }
     }
+}
+
+/// The highest frequency in Hz that the sample rate of a recording leaves to models. A line states it if features of
+/// the campaign lie above it.
+fn highest_hz(recording: &Recording, campaign: &Campaign) -> f64 {
+    let highest_hz = (recording.sample_rate_hz / SAMPLES_A_PERIOD).floor();
+    let usual_hz = features_hz(&campaign.definition.experiment, None).last().copied();
+    if usual_hz.is_some_and(|usual_hz| highest_hz < usual_hz) {
+        println_stderr(&format!(
+            "the recording has a sample rate of {} Hz: models use features up to {highest_hz} Hz",
+            recording.sample_rate_hz
+        ));
+    }
+    highest_hz
 }
 
 /// Whether models of the campaign can evaluate the recording.

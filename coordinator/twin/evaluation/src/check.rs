@@ -33,7 +33,7 @@ pub fn check_recording(
 /// # Errors
 /// [`Error::Rate`].
 pub(crate) fn check_sample_rate(extractor: &Extractor, rate_hz: f64) -> Result<(), Error> {
-    let highest_hz = rate_hz / SAMPLES_A_PERIOD;
+    let highest_hz = (rate_hz / SAMPLES_A_PERIOD).floor();
     extractor.check_rate(rate_hz).map_err(|source| Error::Rate { source, highest_hz })
 }
 
@@ -56,6 +56,17 @@ mod tests {
         check(&[10.0, 13.0]).unwrap();
         let refusal = check(&[7.0, 10.0]).unwrap_err().to_string();
         assert!(refusal.contains("passes at 13 km/h; the models are for 7, 10 km/h"), "{refusal}");
+    }
+
+    #[test]
+    fn a_low_sample_rate_is_refused_with_the_features_that_it_allows() {
+        let features = tracktwin_signal::FeatureDefinition::default();
+        let all = Extractor::new(&features).unwrap();
+        check_sample_rate(&all, 10_000.0).unwrap();
+        let refusal = check_sample_rate(&all, 8000.0).unwrap_err().to_string();
+        assert!(refusal.contains("8000 Hz is too low; at least 10000 Hz"), "{refusal}");
+        assert!(refusal.contains("--highest 3200"), "{refusal}");
+        check_sample_rate(&Extractor::up_to(&features, 3200.0).unwrap(), 8000.0).unwrap();
     }
 
     #[test]

@@ -65,8 +65,8 @@ pub enum Error {
     },
     /// The sample rate is too low for the features of the models.
     #[error(
-        "recording.json: sample_rate_Hz: {source}; evaluate without models, or train models of features up to \
-         {} Hz (`highest_hz` in [features] of the campaign)",
+        "recording.json: sample_rate_Hz: {source}; evaluate without models, or train models for this rate \
+         (`tracktwin train --highest {}`)",
         rounded(*highest_hz, 5)
     )]
     Rate {

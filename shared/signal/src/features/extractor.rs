@@ -84,6 +84,8 @@ pub struct Extractor {
     kept: Range<usize>,
     /// The bins of each band.
     bands: Vec<Range<usize>>,
+    /// Upper end of the features in Hz.
+    highest_hz: f64,
     plans: Mutex<HashMap<(u64, Instants, bool), Arc<Plan>>>,
     buffers: Mutex<Vec<Buffers>>,
     accumulators: Mutex<Vec<Squeezed>>,
@@ -115,6 +117,7 @@ impl Extractor {
             bins: Bins::new(&bins_hz, definition.voices_per_octave),
             kept: first..first + kept_hz.len(),
             bands: definition.bands().map(|b| b.edges_hz().map(place)).map(|[a, b]| a..b).collect(),
+            highest_hz: definition.highest_hz,
             definition: definition.clone(),
             voices_hz,
             bins_hz,
@@ -122,6 +125,24 @@ impl Extractor {
             buffers: Mutex::default(),
             accumulators: Mutex::default(),
         })
+    }
+
+    /// Creates an extractor for those features of this definition that lie at `highest_hz` or below. Lower
+    /// sample rates are enough for them.
+    ///
+    /// # Errors
+    /// [`FeatureError::Definition`] if [`FeatureDefinition::check`] fails or no feature is left.
+    pub fn up_to(definition: &FeatureDefinition, highest_hz: f64) -> Result<Self, FeatureError> {
+        let mut all = Self::new(definition)?;
+        let kept_hz = &all.bins_hz[all.kept.clone()];
+        let count = kept_hz.partition_point(|&hz| hz <= highest_hz * (1.0 + GRID_ROUNDING));
+        if count == 0 {
+            let lowest_hz = definition.lowest_hz;
+            return Err(DefinitionError::NoBins { lowest_hz, highest_hz }.into());
+        }
+        all.kept.end = all.kept.start + count;
+        all.highest_hz = highest_hz.min(definition.highest_hz);
+        Ok(all)
     }
 
     /// The definition of the features.
@@ -256,12 +277,12 @@ impl Extractor {
         self.check_rate(signal.sample_rate_hz())
     }
 
-    /// Checks that a sample rate in Hz is high enough for the highest frequency of the definition.
+    /// Checks that a sample rate in Hz is high enough for the highest feature.
     ///
     /// # Errors
     /// [`FeatureError::SampleRate`] if the rate is too low.
     pub fn check_rate(&self, sample_rate_hz: f64) -> Result<(), FeatureError> {
-        let needed_hz = SAMPLES_A_PERIOD * self.definition.highest_hz;
+        let needed_hz = SAMPLES_A_PERIOD * self.highest_hz;
         if sample_rate_hz < needed_hz {
             return Err(FeatureError::SampleRate { sample_rate_hz, needed_hz });
         }
@@ -297,6 +318,24 @@ mod tests {
 
     fn extractor() -> Extractor {
         Extractor::new(&FeatureDefinition::default()).unwrap()
+    }
+
+    #[test]
+    fn features_up_to_a_frequency_are_the_first_of_all() {
+        let whole = extractor();
+        let low = Extractor::up_to(&FeatureDefinition::default(), 900.0).unwrap();
+        let noise = |index: u32| f64::from(index.wrapping_mul(2_654_435_761) >> 8) / 1e7 - 0.8;
+        let signal = Signal::new(2e4, (0..12_000).map(noise).collect()).unwrap();
+        let [all, some] =
+            [&whole, &low].map(|it| it.extract(&signal, 5000..6500).unwrap().log_power);
+        assert!(some.len() > 100 && some.len() < all.len());
+        assert_eq!(some, all[..some.len()]);
+        let map = low.sswt_map(&signal, 5000..6500, 10).unwrap();
+        assert_eq!(map.magnitudes.len(), 10 * map.frequencies_hz.len());
+        assert_eq!(map.frequencies_hz.len(), some.len());
+        assert!(low.check_rate(2250.0).is_ok() && low.check_rate(2249.0).is_err());
+        assert!(whole.check_rate(9999.0).is_err());
+        assert!(Extractor::up_to(&FeatureDefinition::default(), 40.0).is_err());
     }
 
     #[test]

@@ -109,7 +109,7 @@ impl Extractor {
         };
         let map = TimeFrequencyMap {
             times_s: columns.ranges().map(middle).collect(),
-            frequencies_hz: self.definition().frequencies_hz(),
+            frequencies_hz: self.bins_hz()[self.kept()].to_vec(),
             magnitudes: Vec::new(),
         };
         Ok((columns, map))
