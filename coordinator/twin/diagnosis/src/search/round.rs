@@ -216,6 +216,7 @@ impl<'a> Setting<'a> {
                 starts(problem, current, all, &templates, screened, threshold, hopeless)?;
             starts.extend(outlier_starts.starts());
             round.fitted = fit(problem, current, all, starts, progress);
+            round.fitted.retain(|it| !threshold.is_random_surface(&it.candidate, it.log_evidence));
             let shapes_m = &self.prepared.detected_shapes_m;
             detected_shape_first(&mut round.fitted, &problem.forward.section, shapes_m);
         }
