@@ -18,6 +18,9 @@ pub(super) const TRAINED: [FeatureSet; 5] =
 /// Largest relative distance between the end of a range and its last bin: four bins an octave.
 const BIN: f64 = 0.19;
 
+/// Relative error of a stored frequency: the last bin of models that were saved is one of them.
+const ROUNDING: f64 = 1e-9;
+
 /// Maximum number of test cases shown in a chart.
 const TESTED_SHOWN: usize = 1000;
 
@@ -154,8 +157,7 @@ pub async fn set(
 pub fn features_hz(experiment: &Experiment, highest_hz: Option<f64>) -> Vec<f64> {
     let mut frequencies_hz = experiment.features.frequencies_hz();
     let highest_hz = highest_hz.unwrap_or(f64::INFINITY);
-    // The last of an earlier selection, which may differ by rounding, is one of them.
-    frequencies_hz.retain(|frequency_hz| *frequency_hz <= highest_hz * (1.0 + 1e-9));
+    frequencies_hz.retain(|frequency_hz| *frequency_hz <= highest_hz * (1.0 + ROUNDING));
     if experiment.design.contact_patch_filter {
         let patch = ContactPatch::new(&experiment.design);
         let slowest_m_s =

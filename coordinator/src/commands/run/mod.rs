@@ -235,9 +235,9 @@ async fn chain(
     let bar = TrainingBar::default();
     let watch = |at: tracktwin_surrogate::Progress<'_>| bar.at(&at);
     let highest_hz = recording.as_ref().map(|it| highest_hz(it, campaign));
-    let (force_all, seed) = (force.force, 0);
+    let force_models = force.force;
     let trained =
-        models::train_into(&folder, force_all, library, &record, seed, highest_hz, &watch).await?;
+        models::train_into(&folder, force_models, library, &record, 0, highest_hz, &watch).await?;
     bar.end();
     let evaluation = match recording {
         Some(it) => {

@@ -218,10 +218,11 @@ fn nameless(round: &Round, alone: bool) -> Nameless {
 }
 
 /// Largest probability that chance explains the residual of the first search: from its p-value, to the power of one
-/// over the tempering of evidence. It is one if the residual does not predict speeds that were held out, or if a
-/// candidate explains it.
+/// over the tempering of evidence. It is one if the residual does not predict speeds that were held out, if none was, or
+/// if a candidate explains it.
 pub(super) fn chance_max(round: &Round) -> f64 {
-    if round.accepted || !round.is_significant() || !round.unknown_is_predictive() {
+    let is_predicted = !round.unknown_gain.is_empty() && round.unknown_is_predictive();
+    if round.accepted || !round.is_significant() || !is_predicted {
         return 1.0;
     }
     1.0 - probability_of(round.p_value.powf(1.0 / EVIDENCE_TEMPERING))
@@ -247,15 +248,19 @@ mod tests {
 
     #[test]
     fn a_rare_residual_that_held_out_speeds_have_is_no_chance() {
-        let of = |p_value: f64, unknown_gain: [f64; 3]| {
-            chance_max(&Round { p_value, unknown_gain: unknown_gain.to_vec(), ..Round::default() })
+        let round = |p_value: f64, unknown_gain: &[f64]| Round {
+            p_value,
+            unknown_gain: unknown_gain.to_vec(),
+            ..Round::default()
         };
+        let of = |p_value: f64, unknown_gain: &[f64]| chance_max(&round(p_value, unknown_gain));
         let everywhere = [6.0, 5.0, 4.0];
-        assert!(of(1e-10, everywhere) < 0.15);
-        assert!(of(1e-3, everywhere) > 0.8);
-        assert_eq!(of(0.1, everywhere), 1.0);
-        assert_eq!(of(1e-10, [9.0, -2.0, -1.0]), 1.0);
-        let explained = Round { p_value: 1e-10, accepted: true, ..Round::default() };
+        assert!(of(1e-10, &everywhere) < 0.15);
+        assert!(of(1e-3, &everywhere) > 0.8);
+        assert_eq!(of(0.1, &everywhere), 1.0);
+        assert_eq!(of(1e-10, &[9.0, -2.0, -1.0]), 1.0);
+        assert_eq!(of(1e-10, &[]), 1.0);
+        let explained = Round { accepted: true, ..round(1e-10, &everywhere) };
         assert_eq!(chance_max(&explained), 1.0);
     }
 
