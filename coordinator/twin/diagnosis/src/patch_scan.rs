@@ -159,25 +159,28 @@ impl PatchScan {
     }
 }
 
-/// Wavelengths that lie in the bands of all speeds (for two speeds or more), and the frequencies of all
-/// bands.
+/// Wavelengths that lie in the bands of two speeds at least, and the frequencies of all bands.
 fn kept(problem: &Problem<'_>) -> Vec<Fixed> {
     let centres = problem.forward.bands.centres_hz();
-    let speeds = &problem.forward.speeds_m_s;
-    let (low_hz, high_hz) = (centres[0], centres[centres.len() - 1]);
-    let slowest = speeds.iter().copied().fold(f64::INFINITY, f64::min);
-    let fastest = speeds.iter().copied().fold(0.0, f64::max);
-    let steps = |[from, to]: [f64; 2]| {
-        let count = if to > from { (PER_OCTAVE * (to / from).log2()) as usize + 1 } else { 0 };
-        (0..count).map(move |step| from * (step as f64 / PER_OCTAVE).exp2())
-    };
-    let mut all: Vec<Fixed> = steps([low_hz, high_hz]).map(Fixed::Frequency).collect();
-    if fastest > slowest {
-        // Inside the bands of all speeds.
-        let lengths = [fastest / high_hz, slowest / low_hz];
-        all.extend(steps(lengths).map(Fixed::Wavelength));
-    }
-    all
+    let bands_hz = [centres[0], centres[centres.len() - 1]];
+    let frequencies = steps(bands_hz).map(Fixed::Frequency);
+    let wavelengths = lengths_m(&problem.forward.speeds_m_s, bands_hz).map(steps);
+    frequencies.chain(wavelengths.into_iter().flatten().map(Fixed::Wavelength)).collect()
+}
+
+/// Shortest wavelength in m whose frequency lies in the bands at all speeds, and longest one for which it does at two
+/// speeds; `None` for a single speed. Of slow passes long waves lie below the bands.
+fn lengths_m(speeds_m_s: &[f64], [low_hz, high_hz]: [f64; 2]) -> Option<[f64; 2]> {
+    let mut speeds_m_s = speeds_m_s.to_vec();
+    speeds_m_s.sort_by(|a, b| b.total_cmp(a));
+    let [fastest, second, ..] = speeds_m_s[..] else { return None };
+    Some([fastest / high_hz, second / low_hz])
+}
+
+/// Values from one to the other, evenly in the logarithm; none if the second is smaller.
+fn steps([from, to]: [f64; 2]) -> impl Iterator<Item = f64> {
+    let count = if to > from { (PER_OCTAVE * (to / from).log2()) as usize + 1 } else { 0 };
+    (0..count).map(move |step| from * (step as f64 / PER_OCTAVE).exp2())
 }
 
 fn shape(problem: &Problem<'_>, current: &Calibration, fixed: Fixed) -> Shape {
@@ -225,4 +228,16 @@ fn filters(number: usize, shape: &Shape, current: &Calibration, sleepers: usize)
         })
     };
     runs.filter_map(filter).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn waves_that_two_of_three_speeds_show_are_looked_for() {
+        let [shortest_m, longest_m] = lengths_m(&[11.0, 22.0, 16.0], [100.0, 5000.0]).unwrap();
+        assert_eq!((shortest_m, longest_m), (22.0 / 5000.0, 0.16));
+        assert_eq!(lengths_m(&[11.0], [100.0, 5000.0]), None);
+    }
 }
