@@ -1,10 +1,10 @@
 //! The page of an evaluation of a recording.
 
-use crate::UNDER_LOAD;
 use crate::inversion_page;
 use crate::map_picture::map_charts;
 use crate::spectrum_picture::{chosen, spectrum_chart};
 use crate::track_picture::track_charts;
+use crate::{UNDER_LOAD, range_hz};
 use maud::{Markup, html};
 use tracktwin_drawing::{Shown, figure, page, significant};
 use tracktwin_evaluation::{Estimate, Evaluation, Flag, SleeperEvaluation};
@@ -221,10 +221,10 @@ fn provenance(evaluation: &Evaluation, command: &str) -> Markup {
             dt { "method" } dd { "Gaussian processes on " (of.feature) "; " (of.combination) }
             dt { "campaign" } dd { (of.campaign) }
             dt { "library" } dd { code { (of.library_digest) } ", " (of.library_entries) " entries" }
-            dt { "features" } dd { code { (of.feature_definition) } }
+            dt { "features" } dd { (range_hz(&evaluation.frequencies_hz)) "; " code { (of.feature_definition) } }
             dt { "program" } dd { "tracktwin " (of.code_version) }
         }
-        p { "To reproduce, with the library of that digest and the models trained on it:" }
+        p { "To reproduce, with the library of that digest and the models trained on it up to the highest of these frequencies:" }
         pre { (command) }
     }
 }

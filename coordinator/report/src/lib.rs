@@ -38,3 +38,10 @@ fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
+
+/// Lowest and highest of ascending frequencies.
+fn range_hz(frequencies_hz: &[f64]) -> String {
+    let [from, to] = [frequencies_hz.first(), frequencies_hz.last()]
+        .map(|hz| hz.map_or_else(String::new, |hz| tracktwin_number::rounded(*hz, 4)));
+    format!("{from} to {to} Hz")
+}

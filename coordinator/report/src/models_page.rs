@@ -1,6 +1,6 @@
 //! Accuracy of trained models (paper, Fig. 14).
 
-use crate::capital;
+use crate::{capital, range_hz};
 use maud::{Markup, html};
 use tracktwin_drawing::{Axis, Chart, Shown, figure, page, significant};
 use tracktwin_parameters::Parameter;
@@ -33,7 +33,7 @@ pub fn models_page(models: &Trained, tested: &[Tested]) -> String {
             dt { "campaign" } dd { (models.campaign()) }
             dt { "library" } dd { code { (models.library_digest()) } }
             dt { "entries" } dd { (models.entries()) " (half to train, half to test; split seed " (models.split_seed()) ")" }
-            dt { "features" } dd { code { (models.feature_definition()) } }
+            dt { "features" } dd { (range_hz(models.frequencies_hz())) "; " code { (models.feature_definition()) } }
         }
     };
     page("Models of the track", &summary(models), &body)

@@ -2,19 +2,21 @@
 
 mod cost;
 mod extensions;
+mod sampling;
 mod sensor;
 mod setting;
+mod time_step;
 mod track;
 
 use super::files::{Force, check};
 use super::numbers::{count, number};
 use super::progress::Progress;
 use super::track::TrackChoice;
-use super::{OrInput, Stop, print_json, println_stdout};
+use super::{OrInput, Stop, print_json, println_stderr, println_stdout};
 use anyhow::anyhow;
 use clap::Args;
 pub(super) use extensions::Extensions;
-use sensor::{Sensor, sample_rate_hz};
+use sensor::Sensor;
 use serde_json::{Value, json};
 pub(super) use setting::Setting;
 use std::f64::consts::TAU;
@@ -85,7 +87,7 @@ pub(super) struct Arguments {
     /// Number of elements of a half sleeper.
     #[arg(long, default_value_t = 8, value_parser = count::<usize>(ELEMENTS))]
     sleeper_elements: usize,
-    /// Time step in s; also the sample interval.
+    /// Time step in s; also the sample interval, unless `--sample-rate` is given.
     #[arg(long, default_value_t = 1e-5, value_name = "S", value_parser = number(TIME_STEP))]
     time_step: f64,
     /// Neglect the local flexibility of the loaded element, as the paper does.
@@ -108,9 +110,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     let track = SimulatedTrack::new(arguments)?;
     let drives = drives(arguments, &track);
     cost::check(arguments, &track, &drives).or_input()?;
+    let sample_rate_hz = arguments.sensor.sample_rate_hz(arguments.time_step).or_input()?;
+    if let Some(line) = time_step::doubt(arguments.time_step, sample_rate_hz) {
+        println_stderr(&line);
+    }
     let recording = Recording {
         name: out.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-        sample_rate_hz: sample_rate_hz(arguments.time_step),
+        sample_rate_hz,
         channel: "vertical axle-box acceleration, positive downwards".to_owned(),
         passes: record(arguments, &track, &drives)?,
         sleepers: track.sleepers_recorded(),

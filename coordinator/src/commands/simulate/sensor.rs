@@ -1,14 +1,15 @@
-//! The measuring chain of a simulated recording: extensions, noise, resolution, odometer.
+//! The measuring chain of a simulated recording: extensions, sample rate, noise, resolution, odometer.
 
 use super::super::Stop;
 use super::super::numbers::number;
+use super::sampling::{resampled, sample_rate_hz};
 use anyhow::anyhow;
 use clap::Args;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, Normal};
 use std::f64::consts::TAU;
-use tracktwin_parameters::quantity::{SENSOR, WANDER};
+use tracktwin_parameters::quantity::{SAMPLE_RATE, SENSOR, WANDER};
 use tracktwin_parameters::unit;
 use tracktwin_signal::Signal;
 use tracktwin_signal::recording::Pass;
@@ -22,6 +23,10 @@ const WANDER_SPACINGS: [f64; 4] = [4.8, 8.8, 18.4, 37.6];
 /// Properties of the measuring chain.
 #[derive(Args)]
 pub(super) struct Sensor {
+    /// Sample rate of the recording in Hz; a low-pass filter passes what lies below 0.4 of it [default: one sample a
+    /// time step].
+    #[arg(long, value_name = "HZ", value_parser = number(SAMPLE_RATE))]
+    sample_rate: Option<f64>,
     /// Standard deviation of the sensor's white noise in m/s2.
     #[arg(long, default_value_t = 0.0, value_name = "M_S2", value_parser = number(SENSOR))]
     noise: f64,
@@ -34,6 +39,23 @@ pub(super) struct Sensor {
 }
 
 impl Sensor {
+    /// The sample rate in Hz of a simulation with this time step in s.
+    ///
+    /// # Errors
+    /// An error with a remedy if there are more samples than time steps.
+    pub(super) fn sample_rate_hz(&self, time_step_s: f64) -> Result<f64, anyhow::Error> {
+        let most_hz = sample_rate_hz(time_step_s);
+        match self.sample_rate {
+            Some(wanted_hz) if wanted_hz > most_hz => Err(anyhow!(
+                "--sample-rate {wanted_hz}: the time step {time_step_s:e} s gives {most_hz} Hz at most; use \
+                 --time-step {:.1e}",
+                1.0 / wanted_hz
+            )),
+            Some(wanted_hz) => Ok(wanted_hz),
+            None => Ok(most_hz),
+        }
+    }
+
     /// The recording of a pass from `from_m` on; `seed` determines noise and odometer error.
     pub(super) fn measured(
         &self,
@@ -53,11 +75,15 @@ impl Sensor {
         };
         model.measure(&mut measured);
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let mut samples = measured.acceleration_m_s2.split_off(first);
+        let sample_rate_hz = self.sample_rate_hz(record.time_step_s)?;
+        let [mut samples, mut position_m] = match self.sample_rate {
+            Some(_) => resampled(&measured, first, sample_rate_hz),
+            None => [measured.acceleration_m_s2, measured.position_m]
+                .map(|mut all| all.split_off(first)),
+        };
         self.add_noise(&mut samples, &mut random)?;
-        let mut position_m = measured.position_m.split_off(first);
         self.wander(&mut position_m, model.design().sleeper.spacing_m, &mut random);
-        let signal = Signal::new(sample_rate_hz(record.time_step_s), samples)?;
+        let signal = Signal::new(sample_rate_hz, samples)?;
         let contact_loss_share = Some(record.contact_loss_share(first));
         Ok(Pass {
             file: String::new(),
@@ -93,18 +119,14 @@ impl Sensor {
     }
 }
 
-/// Sample rate, rounded to 1 nHz: 1 / 2e-5 s is 50 kHz, not 49999.99999999999 Hz.
-pub(super) fn sample_rate_hz(time_step_s: f64) -> f64 {
-    (1e9 / time_step_s).round() / 1e9
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn the_odometer_wanders_by_no_more_than_it_may_and_never_goes_back() {
-        let sensor = Sensor { noise: 0.0, resolution: 0.0, odometer: WANDER.range[1] };
+        let sensor =
+            Sensor { sample_rate: None, noise: 0.0, resolution: 0.0, odometer: WANDER.range[1] };
         for seed in 0..20 {
             let truth: Vec<f64> = (0..3000).map(|index| f64::from(index) * 1e-3).collect();
             let mut told = truth.clone();
@@ -117,7 +139,7 @@ mod tests {
 
     #[test]
     fn accelerations_are_recorded_in_steps() {
-        let sensor = Sensor { noise: 0.05, resolution: 0.005, odometer: 0.0 };
+        let sensor = Sensor { sample_rate: None, noise: 0.05, resolution: 0.005, odometer: 0.0 };
         let mut samples = vec![1.0; 1000];
         sensor.add_noise(&mut samples, &mut ChaCha8Rng::seed_from_u64(1)).unwrap();
         let steps = samples.iter().map(|sample| sample / 0.005);
