@@ -47,8 +47,8 @@ pub(super) const KIND: Kind = Kind {
 /// Number of waves in a band.
 const WAVES: usize = 16;
 
-/// Irrational share of a turn: phases spread evenly and repeat nowhere (golden section).
-const PHASE_STEP: f64 = 0.618_033_988_749_894_9;
+/// Golden section. Its multiples spread evenly between whole numbers and repeat nowhere.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// Length in wavelengths over which the waves grow and fade at the ends of the stretch.
 const FADE_WAVES: f64 = 2.0;
@@ -62,12 +62,20 @@ struct Corrugation {
     wave_numbers: Vec<f64>,
 }
 
+/// Wave numbers of a band, at unequal distances, so that the waves together do not repeat.
 fn wave_numbers(middle: f64, width: f64) -> Vec<f64> {
     if width == 0.0 {
         return vec![middle];
     }
-    let share = |wave: usize| (wave as f64 + 0.5) / WAVES as f64 - 0.5;
+    let place = |wave: usize| wave as f64 + (GOLDEN * (wave + 1) as f64).fract();
+    let share = |wave: usize| place(wave) / WAVES as f64 - 0.5;
     (0..WAVES).map(|wave| middle + share(wave) * width).collect()
+}
+
+/// Phase of a wave in rad. Phases that grew by equal steps would let all waves coincide at equal distances: a train
+/// of short bursts.
+fn phase(wave: usize) -> f64 {
+    TAU * (GOLDEN * (wave * wave) as f64).fract()
 }
 
 impl Corrugation {
@@ -86,9 +94,7 @@ impl Extension for Corrugation {
     }
 
     fn profile_m(&self, x_m: f64) -> f64 {
-        let wave = |(index, wave_number): (usize, &f64)| {
-            (wave_number * x_m + TAU * PHASE_STEP * index as f64).sin()
-        };
+        let wave = |(index, wave_number): (usize, &f64)| (wave_number * x_m + phase(index)).sin();
         let fade = self.fade(x_m);
         if fade == 0.0 {
             return 0.0;
@@ -127,6 +133,17 @@ mod tests {
         // that neighbours still correlate a little.
         let ratio = mean_square(0.3) / 0.5e-12;
         assert!((0.7..1.3).contains(&ratio), "{ratio}");
+    }
+
+    #[test]
+    fn a_band_of_waves_is_no_train_of_bursts() {
+        for bandwidth in [0.02, 0.1, 0.3] {
+            let waves = instance("corrugation").at([0.0, 4.0]).with("bandwidth", bandwidth);
+            let waves = extension(&waves.with("wavelength_m", 8e-3).with("amplitude_m", 1e-6));
+            let heights = (0..40_000).map(|point| waves.profile_m(1e-4 * f64::from(point)).abs());
+            let highest = heights.fold(0.0, f64::max);
+            assert!((1e-6..2e-6).contains(&highest), "{bandwidth}: {highest}");
+        }
     }
 
     #[test]

@@ -1,11 +1,13 @@
 //! Probability divided between a name and what looks like it.
 
+use super::round::ORDER;
 use super::{NAMED_SHARE, names};
 use crate::outcome::{Hypothesis, UNKNOWN, meet};
 use crate::port_scan::PortPlace;
 use std::collections::BTreeMap;
 use tracktwin_track::extension::{
-    EffectFamily, FLEXIBLE_AXLE_BOX, Kind, LookAlikeGroup, SENSOR_MOUNT_RESONANCE, SUBGRADE_LAYER,
+    CORRUGATION, EffectFamily, FLEXIBLE_AXLE_BOX, Kind, LookAlikeGroup, SENSOR_MOUNT_RESONANCE,
+    SUBGRADE_LAYER, WHEEL_OUT_OF_ROUND,
 };
 
 /// Divides the probability of a rail shape that only the inspection detected among the kinds of its group.
@@ -96,6 +98,33 @@ pub(super) fn add_resonator(hypotheses: &mut Vec<Hypothesis>, unknown_max: f64) 
     hypotheses.extend(added);
 }
 
+/// Divides the probability of an accepted order of the wheel between it and corrugation of the whole rail, if no two
+/// passes at one speed differ by the order. Waves of the rail lie near a high order more often by chance: `by_chance`
+/// is that probability for the number of an order, `None` if passes differ by it.
+pub(super) fn add_rail_waves(
+    hypotheses: &mut Vec<Hypothesis>,
+    by_chance: impl Fn(usize) -> Option<f64>,
+) {
+    let is_order = |it: &Hypothesis| it.accepted && it.physics == WHEEL_OUT_OF_ROUND.physics;
+    let Some(named) = hypotheses.iter_mut().find(|it| is_order(it)) else { return };
+    let number = named.parameters.get(ORDER).map(|order| order.mean as usize);
+    let Some(by_chance) = number.and_then(by_chance) else { return };
+    let share = by_chance / (1.0 + by_chance);
+    let waves = Hypothesis {
+        physics: CORRUGATION.physics.to_owned(),
+        family: Some(CORRUGATION.family.name().to_owned()),
+        probability: share * named.probability,
+        accepted: false,
+        parameters: BTreeMap::new(),
+        assumed: BTreeMap::new(),
+        look_alikes: names(CORRUGATION),
+        would_separate: named.would_separate.clone(),
+        ..named.clone()
+    };
+    named.probability *= 1.0 - share;
+    hypotheses.push(waves);
+}
+
 /// Unknown physics that acts as this hypothesis does, with a share of its probability.
 fn unknown_like(named: &Hypothesis, port: &PortPlace, share: f64) -> Hypothesis {
     Hypothesis {
@@ -112,6 +141,7 @@ fn unknown_like(named: &Hypothesis, port: &PortPlace, share: f64) -> Hypothesis 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimate::Estimate;
     use crate::outcome::Location;
 
     fn layer(sleepers: &[&str]) -> Hypothesis {
@@ -136,6 +166,23 @@ mod tests {
         let mut shared = vec![named(0.57)];
         add_wheel_mode(&mut shared);
         assert_eq!(shared.len(), 1);
+    }
+
+    #[test]
+    fn an_order_by_which_no_passes_differ_may_be_corrugation_of_the_whole_rail() {
+        let order = Estimate { mean: 30.0, sd: 0.0 };
+        let mut known = Hypothesis::accepted("wheel_out_of_round", None);
+        known.probability = 0.97;
+        known.parameters.insert(ORDER.to_owned(), order);
+        let mut turned = vec![known.clone()];
+        add_rail_waves(&mut turned, |_| None);
+        assert_eq!(turned, [known.clone()]);
+        let mut same = vec![known];
+        add_rail_waves(&mut same, |number| Some(0.01 * number as f64));
+        let [wheel, rail] = &same[..] else { panic!("{same:?}") };
+        assert!((wheel.probability - 0.97 / 1.3).abs() < 1e-9 && wheel.accepted);
+        assert!((rail.probability - 0.97 * 0.3 / 1.3).abs() < 1e-9 && !rail.accepted);
+        assert_eq!((rail.physics.as_str(), rail.parameters.len()), ("corrugation", 0));
     }
 
     #[test]

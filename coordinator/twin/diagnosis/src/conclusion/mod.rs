@@ -12,7 +12,7 @@ mod speed_disagreement;
 mod support_changes;
 
 pub use self::alone::passes_alone;
-use self::look_alikes::{add_resonator, add_siblings, add_wheel_mode};
+use self::look_alikes::{add_rail_waves, add_resonator, add_siblings, add_wheel_mode};
 pub(crate) use self::support_changes::further;
 use crate::calibration::CalibrationError;
 use crate::outcome::{Diagnosis, FORMAT, Hypothesis, Location, UNKNOWN, Verdict, meet};
@@ -21,6 +21,7 @@ use crate::search::SearchOutcome;
 use crate::sentence::sentence;
 use tracktwin_inspection::Inspection;
 use tracktwin_inspection::chain::PassDefect;
+use tracktwin_inspection::wheel::Order;
 use tracktwin_signal::recording::Recording;
 use tracktwin_track::extension::Kind;
 
@@ -81,6 +82,11 @@ impl Evidence<'_> {
         let fitted: Vec<&str> =
             self.search.accepted.iter().map(|candidate| candidate.kind.physics).collect();
         add_siblings(&mut hypotheses, &fitted);
+        let in_all_passes = |number| {
+            let is_it = |order: &&Order| order.number == number && !order.turns;
+            self.inspection.orders.iter().find(is_it).map(Order::share_of_lengths)
+        };
+        add_rail_waves(&mut hypotheses, in_all_passes);
         add_wheel_mode(&mut hypotheses);
         add_resonator(&mut hypotheses, unknown_max);
         add_families(&mut hypotheses, most);

@@ -32,7 +32,7 @@ const LIKE_SHARE: f64 = 0.5;
 const NEAREST_MAX: usize = 3;
 
 /// Name of the parameter for the number of waves around the wheel.
-const ORDER: &str = "order";
+pub(super) const ORDER: &str = "order";
 
 impl Evidence<'_> {
     /// Hypotheses from the fits of one search.

@@ -154,6 +154,11 @@ pub(super) fn flat_finding(flat: &Flat) -> Finding {
 pub(super) fn order_finding(orders: &[Order]) -> Option<Finding> {
     let first = orders.iter().min_by(|a, b| a.ln_p.total_cmp(&b.ln_p))?;
     let names: Vec<String> = orders.iter().map(|order| order.number.to_string()).collect();
+    let or = if first.turns {
+        ""
+    } else {
+        "; no two passes at one speed differ by it, so that it may be corrugation of the whole rail"
+    };
     Some(Finding {
         physics: WHEEL_OUT_OF_ROUND.physics,
         p_value: number::probability(first.ln_p),
@@ -163,7 +168,7 @@ pub(super) fn order_finding(orders: &[Order]) -> Option<Finding> {
             ("amplitude_m", first.amplitude_m),
         ]),
         evidence: format!(
-            "lines at wheel orders: order {}; order {} is {} times above the level between orders",
+            "lines at wheel orders: order {}; order {} is {} times above the level between orders{or}",
             names.join(", "),
             first.number,
             ratio(first.ratio)

@@ -37,6 +37,8 @@ pub struct Inspection {
     pub nameless: Vec<Finding>,
     /// The flat of the wheel with the positions of its blows, if there is one.
     pub flat: Option<Flat>,
+    /// Orders of an out-of-round wheel.
+    pub orders: Vec<Order>,
     /// Contact loss between wheel and rail, if there is any. It is neither a fault of the chain nor physics
     /// of the track, but no linear model is valid there.
     pub loss_of_contact: Option<LossOfContact>,
@@ -67,10 +69,11 @@ impl Inspection {
         self.nameless.extend(forgotten);
     }
 
-    /// Removes all findings and the flat; the result does not mention them.
+    /// Removes all findings, the flat and the orders; the result does not mention them.
     pub fn ignore(&mut self) {
         self.findings.clear();
         self.flat = None;
+        self.orders.clear();
     }
 
     /// The recording without the lines of the mains, which no track model contains.
@@ -142,7 +145,7 @@ pub fn inspect(recording: &Recording) -> Inspection {
     let unit = unit(recording);
     let gains = chain::gains(recording);
     let offsets = chain::offsets(recording);
-    let (flat, on_surface) = surface(recording);
+    let (flat, orders, on_surface) = surface(recording);
     let turn_m = flat.as_ref().map(|flat| flat.circumference_m.0);
     let clipping = chain::clipping(recording, EACH_TEST);
     let is_flight_known = chain::expected_m_s2(recording).is_some();
@@ -179,6 +182,7 @@ pub fn inspect(recording: &Recording) -> Inspection {
         findings,
         nameless: Vec::new(),
         flat,
+        orders,
         loss_of_contact,
         pass_defects,
         noise_floors: chain::noise_floors(recording),
@@ -229,8 +233,8 @@ fn unit(recording: &Recording) -> &'static str {
     if recording.gain_known() { "m/s2" } else { "in the unknown unit" }
 }
 
-/// Findings on wheel and rail surface.
-fn surface(recording: &Recording) -> (Option<Flat>, Vec<Finding>) {
+/// Flat and orders of the wheel, and findings on wheel and rail surface.
+fn surface(recording: &Recording) -> (Option<Flat>, Vec<Order>, Vec<Finding>) {
     let circumference = wheel::nominal_circumference_m(recording);
     let flat = circumference.and_then(|length| wheel::flat(recording, length, EACH_TEST));
     let reach = AROUND_BLOW * recording.spacing_m;
@@ -256,7 +260,7 @@ fn surface(recording: &Recording) -> (Option<Flat>, Vec<Finding>) {
     let known = turn.or(circumference.filter(|_| !orders.is_empty()));
     let waves = impact::corrugation(recording, EACH_TEST, known);
     findings.extend(waves.as_ref().map(corrugation_finding));
-    (flat, findings)
+    (flat, orders, findings)
 }
 
 /// Whether the waves of an order are longer than four lengths of the flat, and thus no harmonics of the

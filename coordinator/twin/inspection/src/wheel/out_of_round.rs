@@ -32,6 +32,8 @@ const SPEEDS_APART_MIN: usize = 2;
 /// Factor by which a line in a difference is more probable than in noise: of forty recordings of another
 /// simulator, one had a probability of 0.002 by chance.
 const UNEVEN: f64 = 10.0;
+/// Smallest ratio of a line in the differences, over its neighbours, to that in the passes, for waves of the wheel.
+const TURNING_MIN: f64 = 3.0;
 /// Half width, in resolution cells, of an order or of a harmonic of the sleeper-passing frequency.
 const CELLS: f64 = 1.5;
 /// Highest harmonic of the sleeper-passing frequency that cannot be distinguished from an order. On a
@@ -62,6 +64,9 @@ pub struct Order {
     /// Power relative to the bins between the orders, in the passes or in their differences, as mean of all
     /// speeds.
     pub ratio: f64,
+    /// Whether passes at one speed differ by this line more than by the surface beside it. Otherwise it may be
+    /// corrugation of the whole rail, or no speed has two passes, or all passes begin with the same angle of the wheel.
+    pub turns: bool,
     /// Power of the line at each speed.
     powers: Vec<f64>,
 }
@@ -123,8 +128,13 @@ pub fn out_of_round(recording: &Recording, circumference_m: f64, alpha: f64) -> 
                 continue;
             }
             match found.iter_mut().find(|other| other.number == number) {
-                Some(other) if order.ln_p < other.ln_p => *other = order,
-                Some(_) => {}
+                Some(other) => {
+                    let turns = order.turns || other.turns;
+                    if order.ln_p < other.ln_p {
+                        *other = order;
+                    }
+                    other.turns = turns;
+                }
                 None => found.push(order),
             }
         }
@@ -139,6 +149,11 @@ pub fn out_of_round(recording: &Recording, circumference_m: f64, alpha: f64) -> 
 }
 
 impl Order {
+    /// Probability that waves of any length on the rail are taken for some order near this one.
+    pub fn share_of_lengths(&self) -> f64 {
+        (2.0 * TOLERANCE * self.number as f64).min(1.0)
+    }
+
     /// Whether a part of the stretch has its share of the line's power, as mean of all speeds. The power of
     /// a steady line is proportional to the square of the length.
     fn is_detected(&self, part: &[AtSpeed], source: SpectrumSource, circumference_m: f64) -> bool {
@@ -216,7 +231,7 @@ impl OrderSearch<'_> {
     fn order(&self, speeds: &[AtSpeed], source: SpectrumSource, number: usize) -> (Order, usize) {
         let middle = number as f64 / self.circumference_m;
         let (amplitude_m, powers) = ((0.0, 0.0), Vec::new());
-        let mut best = Order { number, amplitude_m, ln_p: 0.0, ratio: 1.0, powers };
+        let mut best = Order { number, amplitude_m, ln_p: 0.0, ratio: 1.0, turns: false, powers };
         let spacing = self.recording.spacing_m;
         let passing = self.is_multiple(middle, spacing) && middle * spacing < PASSING_MAX;
         if passing || !self.audible(middle) {
@@ -245,6 +260,7 @@ impl OrderSearch<'_> {
                 amplitude_m: self.amplitude_m(middle, &lines, &passes),
                 ln_p,
                 ratio: mean(lines.iter().map(|line| line.ratio)),
+                turns: stands_out(source, &lines, &passes),
                 powers: lines.iter().map(|line| line.power()).collect(),
             };
         }
@@ -289,6 +305,13 @@ impl OrderSearch<'_> {
             (LOW_HZ..HIGH_SHARE * pass.signal.sample_rate_hz()).contains(&frequency)
         })
     }
+}
+
+/// Whether lines in differences stand out more than in the passes. Differences of passes whose positions disagree keep
+/// a part of the rail's waves, and the same part of the surface beside them.
+fn stands_out(source: SpectrumSource, lines: &[Line], passes: &[Line]) -> bool {
+    let ratio = |lines: &[Line]| mean(lines.iter().map(|line| line.ratio));
+    matches!(source, SpectrumSource::Differences) && ratio(lines) > TURNING_MIN * ratio(passes)
 }
 
 /// The acceleration minus its mean, averaged over `step_m`, so that short waves do not alias to long ones.

@@ -58,6 +58,7 @@ fn a_high_order_is_found_though_the_sleepers_pass_in_its_waves() {
     assert!((waves - waves.round()).abs() < 0.05, "{waves}");
     let found = out_of_round(&recording, TURN_M, ALPHA);
     assert_eq!(numbers(&found), [36]);
+    assert!(found[0].turns);
 }
 
 #[test]
@@ -66,6 +67,8 @@ fn a_wheel_that_begins_every_pass_with_the_same_side_down_is_heard_as_well() {
     let recording = Rolled { height_m: &height, ..Rolled::faultless(5) }.recording();
     let found = out_of_round(&recording, TURN_M, ALPHA);
     assert_eq!(numbers(&found), [30]);
+    // Corrugation of the whole rail is heard in the same way.
+    assert!(!found[0].turns && (found[0].share_of_lengths() - 0.3).abs() < 1e-12);
 }
 
 #[test]
