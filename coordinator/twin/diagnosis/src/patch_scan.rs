@@ -113,10 +113,24 @@ impl PatchScan {
         let sleepers = problem.forward.section.sleepers;
         let shapes: Vec<Shape> =
             kept(problem).into_par_iter().map(|fixed| shape(problem, current, fixed)).collect();
+        let most = (SHARE_MAX * sleepers as f64) as usize;
+        let runs = runs(LENGTHS.into_iter().filter(|&length| length <= most), sleepers);
         let filters = (0..shapes.len())
             .into_par_iter()
-            .flat_map_iter(|number| filters(number, &shapes[number], current, sleepers))
+            .flat_map_iter(|number| filters(number, &shapes[number], current, &runs))
             .collect();
+        Self { shapes, filters, sleepers }
+    }
+
+    /// The patches of one wavelength or frequency, over every number of sleepers.
+    pub(crate) fn of_every_length(
+        problem: &Problem<'_>,
+        current: &Calibration,
+        fixed: Fixed,
+    ) -> Self {
+        let sleepers = problem.forward.section.sleepers;
+        let shapes = vec![shape(problem, current, fixed)];
+        let filters = filters(0, &shapes[0], current, &runs(1..=sleepers, sleepers)).collect();
         Self { shapes, filters, sleepers }
     }
 
@@ -207,14 +221,20 @@ fn shape(problem: &Problem<'_>, current: &Calibration, fixed: Fixed) -> Shape {
     Shape { fixed, column, projected_gradient }
 }
 
-fn filters(number: usize, shape: &Shape, current: &Calibration, sleepers: usize) -> Vec<Filter> {
+/// Every run of neighbouring sleepers with one of these lengths.
+fn runs(lengths: impl Iterator<Item = usize>, sleepers: usize) -> Vec<Range<usize>> {
+    let of = |length: usize| (0..=sleepers - length).map(move |first| first..first + length);
+    lengths.flat_map(of).collect()
+}
+
+fn filters(
+    number: usize,
+    shape: &Shape,
+    current: &Calibration,
+    runs: &[Range<usize>],
+) -> impl Iterator<Item = Filter> {
     let square = shape.column.norm_squared();
-    let most = (SHARE_MAX * sleepers as f64) as usize;
-    let runs = LENGTHS
-        .into_iter()
-        .filter(|&length| length <= most)
-        .flat_map(|length| (0..=sleepers - length).map(move |first| first..first + length));
-    let filter = |run: Range<usize>| {
+    let filter = move |run: &Range<usize>| {
         let count = run.len() as f64;
         let mut projected_gradient = DVector::zeros(current.values.len());
         shape.projected_gradient[run.clone()].iter().for_each(|part| projected_gradient += part);
@@ -222,12 +242,12 @@ fn filters(number: usize, shape: &Shape, current: &Calibration, sleepers: usize)
         let detectability = count * square - projected_gradient.dot(&imitation);
         (detectability > LEFT_MIN * count * square).then_some(Filter {
             shape: number,
-            sleepers: run,
+            sleepers: run.clone(),
             imitation,
             detectability,
         })
     };
-    runs.filter_map(filter).collect()
+    runs.iter().filter_map(filter)
 }
 
 #[cfg(test)]

@@ -31,7 +31,7 @@ use crate::forward::Forward;
 use crate::held_out::HeldOutScore;
 use crate::null_model::NullModel;
 use crate::observation::Observation;
-use crate::patch_scan::{Fixed, Patch};
+use crate::patch_scan::{Fixed, Patch, PatchScan};
 use crate::port_scan::{PortPlace, PortScan, UnknownElement};
 use crate::prepared_recording::PreparedRecording;
 use crate::section::Section;
@@ -257,16 +257,19 @@ impl SearchOutcome {
         Problem { observation, ..plain }.calibrate_in_range(start)
     }
 
-    /// Corrugation candidates from patches of the baseline's residual.
+    /// Corrugation candidates from patches of the baseline's residual, over the sleepers that fit best.
     fn waves(&self, setting: &Setting<'_>) -> Vec<Candidate> {
         let forward = &setting.prepared.forward;
         let problem = Problem { forward, observation: &self.observation, candidates: &[] };
         let is_wave = |fixed, _: &_| matches!(fixed, Fixed::Wavelength(_));
         let found = setting.patch(&problem, &self.baseline, is_wave);
         let level = self.baseline.values[forward.unknowns.level().start].exp();
-        let wave = found
-            .filter(|(_, p_value)| *p_value <= FALSE_ALARM)
-            .and_then(|(patch, _)| patch.as_waves(&forward.section, level));
+        let wave = found.filter(|(_, p_value)| *p_value <= FALSE_ALARM).and_then(|(patch, _)| {
+            let Calibration { residual, gradient, .. } = &self.baseline;
+            let scan = PatchScan::of_every_length(&problem, &self.baseline, patch.fixed);
+            let patch = scan.best(residual, gradient, |_, _| true).unwrap_or(patch);
+            patch.as_waves(&forward.section, level)
+        });
         wave.filter(|wave| setting.prepared.may_be_named(wave.kind)).into_iter().collect()
     }
 
