@@ -10,10 +10,12 @@ mod place;
 mod round;
 mod speed_disagreement;
 mod support_changes;
+mod unlike_neighbours;
 
 pub use self::alone::passes_alone;
 use self::look_alikes::{add_rail_waves, add_resonator, add_siblings, add_wheel_mode};
 pub(crate) use self::support_changes::further;
+use self::unlike_neighbours::unlike_neighbours;
 use crate::calibration::CalibrationError;
 use crate::outcome::{Diagnosis, FORMAT, Hypothesis, Location, UNKNOWN, Verdict, meet};
 use crate::prepared_recording::PreparedRecording;
@@ -82,11 +84,7 @@ impl Evidence<'_> {
         let fitted: Vec<&str> =
             self.search.accepted.iter().map(|candidate| candidate.kind.physics).collect();
         add_siblings(&mut hypotheses, &fitted);
-        let in_all_passes = |number| {
-            let is_it = |order: &&Order| order.number == number && !order.turns;
-            self.inspection.orders.iter().find(is_it).map(Order::share_of_lengths)
-        };
-        add_rail_waves(&mut hypotheses, in_all_passes);
+        add_rail_waves(&mut hypotheses, |number| self.rail_waves_by_chance(number));
         add_wheel_mode(&mut hypotheses);
         add_resonator(&mut hypotheses, unknown_max);
         add_families(&mut hypotheses, most);
@@ -105,8 +103,13 @@ impl Evidence<'_> {
         let said = sentence(verdict, &hypotheses, nothing_left_out, &sleepers, &fit, &bias_removed);
         let support_changes = self.support_changes(verdict);
         let loss_of_contact = self.inspection.loss_of_contact.clone();
-        let sentence = said + &further(&support_changes, loss_of_contact.as_ref());
-        let notes = self.notes(&hypotheses);
+        let track = self.track();
+        let unlike = unlike_neighbours(&track, verdict, &hypotheses);
+        let sentence = said
+            + &further(&support_changes, loss_of_contact.as_ref())
+            + unlike.as_deref().unwrap_or_default();
+        let mut notes = self.notes(&hypotheses);
+        notes.extend(unlike.map(|line| line.trim_start().to_owned()));
         Ok(Diagnosis {
             format: FORMAT.to_owned(),
             recording: self.recording.name.clone(),
@@ -117,7 +120,7 @@ impl Evidence<'_> {
             hypotheses,
             fit,
             bias_removed,
-            track: self.track(),
+            track,
             levels,
             confirmation: None,
             support_changes,
@@ -125,6 +128,12 @@ impl Evidence<'_> {
             notes,
             sections: Vec::new(),
         })
+    }
+
+    /// Probability that waves of the rail lie near an order by chance; `None` if passes at one speed differ by it.
+    fn rail_waves_by_chance(&self, number: usize) -> Option<f64> {
+        let is_it = |order: &&Order| order.number == number && !order.turns;
+        self.inspection.orders.iter().find(is_it).map(Order::share_of_lengths)
     }
 
     /// Largest probability that the recording permits.
