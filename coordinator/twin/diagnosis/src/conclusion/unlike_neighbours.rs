@@ -90,7 +90,7 @@ mod tests {
         let alike = track(&[1.2e8, 1.5e8, 1.65e8, 1e8, 1.57e8, 1.3e8, 1.8e8]);
         assert_eq!(unlike_neighbours(&alike, Verdict::Consistent, &[]), None);
         let soft = track(&[1.2e8, 1.5e8, 1.65e8, 1e8, 5.1e7, 1.57e8, 1.3e8, 1.8e8]);
-        let said = " Fitted stiffness unlike that of the neighbours: railpad of SN4, 51 ± 5 MN/m (0.34 times theirs).";
+        let said = " Fitted stiffness unlike that of the neighbours: railpad of SN4, 51 ± 5 MN/m (0.32 times theirs).";
         assert_eq!(unlike_neighbours(&soft, Verdict::Consistent, &[]).as_deref(), Some(said));
         assert_eq!(unlike_neighbours(&soft, Verdict::UnknownPhysics, &[]), None);
         let place = Location { x_m: [4.0, 4.0], sleepers: vec!["SN4".to_owned()] };
