@@ -1,9 +1,7 @@
 //! Doubt about a coarse time step.
 
+use tracktwin_diagnosis::highest_compared_hz;
 use tracktwin_number::rounded;
-
-/// Highest frequency that inversion and diagnosis compare: relative to the sample rate, and in Hz.
-const COMPARED: [f64; 2] = [0.35, 5100.0];
 
 /// Frequency times the time step at which the average-acceleration rule lowers a resonance by 5 %. A resonance at f
 /// comes out at atan(π f Δt) / (π Δt).
@@ -11,7 +9,7 @@ const LOWERED: f64 = 0.129;
 
 /// A line with a remedy if the error of the solver reaches the frequencies that are compared.
 pub(super) fn doubt(time_step_s: f64, sample_rate_hz: f64) -> Option<String> {
-    let compared_hz = (COMPARED[0] * sample_rate_hz).min(COMPARED[1]);
+    let compared_hz = highest_compared_hz(sample_rate_hz);
     let lowered_hz = LOWERED / time_step_s;
     (lowered_hz < compared_hz).then(|| {
         format!(

@@ -19,6 +19,7 @@ mod further_wheels;
 mod held_out;
 mod joined;
 mod knots;
+mod neighbours;
 mod null_model;
 mod observation;
 mod outcome;
@@ -56,7 +57,9 @@ pub use outcome::{
 };
 pub use patch_scan::{Fixed, Patch};
 pub use port_scan::{PortPlace, PortScan, UnknownElement};
-pub use prepared_recording::{PreparationError, PreparedRecording, check_track};
+pub use prepared_recording::{
+    PreparationError, PreparedRecording, check_track, highest_compared_hz,
+};
 pub use quantity::{Common, Own};
 pub use screen::{Template, templates};
 pub use search::{Fitted, Round, SearchOutcome, Stage, first_calibration, search};

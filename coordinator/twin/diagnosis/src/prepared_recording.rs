@@ -29,6 +29,11 @@ const HIGHEST_HZ: f64 = 5100.0;
 /// Highest band as a share of the sample rate.
 const SAMPLE_RATE_SHARE: f64 = 0.35;
 
+/// Highest frequency in Hz that is compared in a recording of this sample rate in Hz.
+pub fn highest_compared_hz(sample_rate_hz: f64) -> f64 {
+    HIGHEST_HZ.min(SAMPLE_RATE_SHARE * sample_rate_hz)
+}
+
 /// Smallest number of bands for a diagnosis.
 const BANDS_MIN: usize = 12;
 
@@ -169,7 +174,7 @@ impl Measured {
         check_track(recording, design)?;
         let fastest = recording.passes.iter().map(|pass| pass.speed_km_h).fold(0.0, f64::max);
         let lowest_hz = LOWEST_PERIODS * fastest / 3.6 / design.sleeper.spacing_m;
-        let highest_hz = HIGHEST_HZ.min(SAMPLE_RATE_SHARE * recording.sample_rate_hz);
+        let highest_hz = highest_compared_hz(recording.sample_rate_hz);
         let bands = Bands::new(lowest_hz, highest_hz.max(lowest_hz));
         if bands.count() < BANDS_MIN {
             return Err(PreparationError::SampleRate(recording.sample_rate_hz));

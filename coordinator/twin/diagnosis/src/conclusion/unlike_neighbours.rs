@@ -4,19 +4,12 @@
 //! then left out. Such a sleeper is stated beside the verdict.
 
 use crate::estimate::Estimate;
+use crate::neighbours::{FAR, usual_near};
 use crate::outcome::{Hypothesis, SleeperValues, Verdict};
-use tracktwin_inspection::median;
 use tracktwin_number::rounded;
-
-/// Smallest log ratio of a stiffness to the median of its neighbours: three standard deviations of the variation
-/// between railpads.
-const FAR: f64 = 0.6;
 
 /// Smallest log ratio in its own standard deviations.
 const DEVIATIONS: f64 = 3.0;
-
-/// Number of sleepers on either side with which a sleeper is compared.
-const NEIGHBOURS: usize = 3;
 
 /// Sentence on single sleepers unlike their neighbours, away from accepted hypotheses, with a space before it; `None` if
 /// there is none. Unknown physics and faults of the chain may be imitated by a stiffness, so that nothing is said then.
@@ -44,10 +37,9 @@ fn of(
     track: &[SleeperValues],
     stiffness: impl Fn(&SleeperValues) -> Estimate,
 ) -> Vec<(String, String)> {
+    let means: Vec<f64> = track.iter().map(|values| stiffness(values).mean).collect();
     let one = |(sleeper, values): (usize, &SleeperValues)| {
-        let near = sleeper.saturating_sub(NEIGHBOURS)..track.len().min(sleeper + NEIGHBOURS + 1);
-        let others = near.filter(|other| *other != sleeper);
-        let usual = median(others.map(|other| stiffness(&track[other]).mean).collect());
+        let usual = usual_near(&means, sleeper);
         let Estimate { mean, sd } = stiffness(values);
         let log_ratio = (mean / usual).ln();
         (log_ratio.abs() > FAR.max(DEVIATIONS * sd / mean)).then(|| {

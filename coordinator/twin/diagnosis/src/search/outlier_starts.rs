@@ -10,17 +10,11 @@ use super::limits::REFINED_PER_KIND;
 use crate::baseline::Unknowns;
 use crate::calibration::{CalibrationError, Problem};
 use crate::candidate::Candidate;
+use crate::neighbours::{FAR, usual_near};
 use crate::screen::{Template, templates};
 use nalgebra::DVector;
 use std::ops::Range;
 use tracktwin_inspection::median;
-
-/// Smallest log ratio of an outlier's stiffness to that of its neighbours: three standard deviations of the
-/// variation between railpads.
-const FAR: f64 = 0.6;
-
-/// Number of sleepers on either side with which a sleeper is compared.
-const NEIGHBOURS: usize = 3;
 
 /// Smallest number of sleepers of a run: five lie within the reach of one or two effects at single
 /// sleepers.
@@ -47,19 +41,15 @@ impl Far {
         let mut far = Self { values: values.clone(), sleepers: Vec::new(), runs: Vec::new() };
         for field in [unknowns.ballast(), unknowns.railpad()] {
             let stiffness = &values.as_slice()[field.clone()];
-            let usual = |others: &mut dyn Iterator<Item = usize>| {
-                median(others.map(|other| stiffness[other]).collect())
-            };
             if let Some(run) = run_apart(stiffness) {
-                let usual = usual(&mut (0..field.len()).filter(|sleeper| !run.contains(sleeper)));
+                let outside = (0..field.len()).filter(|sleeper| !run.contains(sleeper));
+                let usual = median(outside.map(|other| stiffness[other]).collect());
                 run.clone().for_each(|sleeper| far.values[field.start + sleeper] = usual);
                 far.runs.push(run);
                 continue;
             }
             for (sleeper, &own) in stiffness.iter().enumerate() {
-                let last = (sleeper + NEIGHBOURS + 1).min(field.len());
-                let near = sleeper.saturating_sub(NEIGHBOURS)..last;
-                let usual = usual(&mut near.filter(|other| *other != sleeper));
+                let usual = usual_near(stiffness, sleeper);
                 if (own - usual).abs() > FAR {
                     far.values[field.start + sleeper] = usual;
                     far.sleepers.push(sleeper);

@@ -157,7 +157,7 @@ pub(super) fn order_finding(orders: &[Order]) -> Option<Finding> {
     let or = if first.turns {
         ""
     } else {
-        "; no two passes at one speed differ by it, so that it may be corrugation of the whole rail"
+        "; passes at one speed do not differ by it more than by the surface, so that it may be corrugation of the whole rail"
     };
     Some(Finding {
         physics: WHEEL_OUT_OF_ROUND.physics,
