@@ -16,7 +16,7 @@ const PORT_ALARM: f64 = 0.01;
 
 /// If the probability of nothing is below this, physics is left out even if neither a kind nor something
 /// unknown predicts a speed that was held out.
-const NOTHING_LEFT: f64 = 0.02;
+const NOTHING_LEFT: f64 = 0.05;
 
 /// If chance explains a residual less probably than this, and speeds that were held out have it, too, physics is left
 /// out, even if no kind and no unknown element has enough evidence.

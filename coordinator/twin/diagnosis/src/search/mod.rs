@@ -8,6 +8,7 @@ mod fit;
 mod limits;
 mod nested;
 mod outlier_starts;
+mod patches;
 mod probability;
 mod remainder;
 mod round;
@@ -31,7 +32,7 @@ use crate::forward::Forward;
 use crate::held_out::HeldOutScore;
 use crate::null_model::NullModel;
 use crate::observation::Observation;
-use crate::patch_scan::{Fixed, Patch, PatchScan};
+use crate::patch_scan::Patch;
 use crate::port_scan::{PortPlace, PortScan, UnknownElement};
 use crate::prepared_recording::PreparedRecording;
 use crate::section::Section;
@@ -189,6 +190,7 @@ pub fn search(
     let observation = setting.observe(|_| false)?;
     let plain = Problem { forward: &prepared.forward, observation: &observation, candidates: &[] };
     let baseline = plain.calibrate_widely(start)?;
+    let waves = setting.waves(&plain, &baseline)?;
     let mut search = SearchOutcome {
         last: baseline.clone(),
         estimates: baseline.clone(),
@@ -201,8 +203,7 @@ pub fn search(
         patch: None,
         held_out: [0.0; 2],
     };
-    let waves = search.waves(&setting);
-    let all = &[all, &waves].concat();
+    let all = &[all, waves.as_slice()].concat();
     let before = setting.held_out(&[], &search.baseline.values)?;
     let mut densities = vec![log_densities(&before)];
     while search.accepted.len() < EFFECTS_MAX
@@ -216,7 +217,7 @@ pub fn search(
         observation: &search.observation,
         candidates: &search.accepted,
     };
-    search.patch = setting.patch(&with, &search.last, |_, _| true);
+    search.patch = setting.patch(&with, &search.last, |_, _| true)?;
     if search.patch.as_ref().is_some_and(|(_, p_value)| *p_value <= FALSE_ALARM)
         && !unknown_is_predicted(&setting.patch_gains(&with, &search.last)?)
     {
@@ -255,22 +256,6 @@ impl SearchOutcome {
         let unknowns = forward.unknowns.count();
         start.rows_mut(0, unknowns).copy_from(&self.baseline.values.rows(0, unknowns));
         Problem { observation, ..plain }.calibrate_in_range(start)
-    }
-
-    /// Corrugation candidates from patches of the baseline's residual, over the sleepers that fit best.
-    fn waves(&self, setting: &Setting<'_>) -> Vec<Candidate> {
-        let forward = &setting.prepared.forward;
-        let problem = Problem { forward, observation: &self.observation, candidates: &[] };
-        let is_wave = |fixed, _: &_| matches!(fixed, Fixed::Wavelength(_));
-        let found = setting.patch(&problem, &self.baseline, is_wave);
-        let level = self.baseline.values[forward.unknowns.level().start].exp();
-        let wave = found.filter(|(_, p_value)| *p_value <= FALSE_ALARM).and_then(|(patch, _)| {
-            let Calibration { residual, gradient, .. } = &self.baseline;
-            let scan = PatchScan::of_every_length(&problem, &self.baseline, patch.fixed);
-            let patch = scan.best(residual, gradient, |_, _| true).unwrap_or(patch);
-            patch.as_waves(&forward.section, level)
-        });
-        wave.filter(|wave| setting.prepared.may_be_named(wave.kind)).into_iter().collect()
     }
 
     /// Searches for one more extension; returns whether one was accepted. `densities` are the log densities

@@ -15,18 +15,13 @@ use crate::candidate::Candidate;
 use crate::held_out::HeldOutScore;
 use crate::null_model::NullModel;
 use crate::observation::Observation;
-use crate::patch_scan::{Fixed, Patch, PatchScan};
 use crate::port_scan::{PortPlace, PortScan, UnknownElement};
 use crate::prepared_recording::PreparedRecording;
 use crate::screen::{Template, templates};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tracktwin_number::floored;
-
-/// Smallest log power ratio of a patch that is visible in a plot of the residual: 1.5 dB.
-const VISIBLE: f64 = 0.35;
 
 /// Largest number of candidates that are fitted together with the baseline.
 const REFINED_MAX: usize = 8;
@@ -104,64 +99,23 @@ impl<'a> Setting<'a> {
         })
     }
 
-    /// The patch of the residual with the largest deviation, and the probability of such a patch if nothing
-    /// is left out; `None` if the patch would not be visible in a plot.
-    pub(super) fn patch(
-        &self,
-        problem: &Problem<'_>,
-        current: &Calibration,
-        is_one: impl Fn(Fixed, &Range<usize>) -> bool + Sync,
-    ) -> Option<(Patch, f64)> {
-        let scan = PatchScan::new(problem, current);
-        let patch = scan.best(&current.residual, &current.gradient, &is_one)?;
-        let nulls = whitened(&self.nulls, problem.observation, current);
-        let excess = excess(current, &nulls, self.prepared.forward.section.sleepers);
-        let p_value = tail_probability(
-            &nulls,
-            patch.deviations / excess.sqrt(),
-            |residual, projected_gradient| {
-                scan.best(residual, projected_gradient, &is_one).map(|patch| patch.deviations)
-            },
-        );
-        (patch.height.abs() >= VISIBLE).then_some((patch, floored(p_value)))
-    }
-
-    /// Gain in nats on each speed, held out in turn, of the patch that the other speeds select. Empty for a
-    /// single speed.
-    pub(super) fn patch_gains(
-        &self,
-        problem: &Problem<'_>,
-        current: &Calibration,
-    ) -> Result<Vec<f64>, CalibrationError> {
-        let all = PatchScan::new(problem, current);
-        self.without_each_speed(|observation| {
-            let without = Problem { observation, ..*problem };
-            let others = without.at(&current.values)?;
-            let scan = PatchScan::new(&without, &others);
-            let best = scan.best(&others.residual, &others.gradient, |_, _| true);
-            let gain = best.and_then(|best| {
-                let is_best = |fixed, sleepers: &Range<usize>| {
-                    fixed == best.fixed && *sleepers == best.sleepers
-                };
-                let with = all.best(&current.residual, &current.gradient, is_best)?;
-                Some(with.gain_over(&best))
-            });
-            Ok(gain.unwrap_or(f64::NEG_INFINITY))
-        })
-    }
-
     /// Results of `of` for each speed, which is held out; empty for a single speed.
     fn without_each_speed<T: Send>(
         &self,
-        of: impl Fn(&Observation) -> Result<T, CalibrationError> + Sync,
+        of: impl Fn(&Observation) -> Result<T, CalibrationError> + Send + Sync,
     ) -> Result<Vec<T>, CalibrationError> {
-        let forward = &self.prepared.forward;
-        let speeds = forward.speeds_m_s.len();
+        let bands = self.prepared.forward.bands.count();
+        self.each_speed_held_out(|speed| of(&self.observe(|row| row / bands == speed)?))
+    }
+
+    /// Results of `of` for the number of each speed; empty for a single speed.
+    pub(super) fn each_speed_held_out<T: Send>(
+        &self,
+        of: impl Fn(usize) -> Result<T, CalibrationError> + Send + Sync,
+    ) -> Result<Vec<T>, CalibrationError> {
+        let speeds = self.prepared.forward.speeds_m_s.len();
         let held_out = if speeds < 2 { 0..0 } else { 0..speeds };
-        held_out
-            .into_par_iter()
-            .map(|speed| of(&self.observe(|row| row / forward.bands.count() == speed)?))
-            .collect()
+        held_out.into_par_iter().map(of).collect()
     }
 
     /// Results of `of` for each speed, with all other speeds held out.
