@@ -218,8 +218,9 @@ pub fn search(
         candidates: &search.accepted,
     };
     search.patch = setting.patch(&with, &search.last, |_, _| true)?;
-    if search.patch.as_ref().is_some_and(|(_, p_value)| *p_value <= FALSE_ALARM)
-        && !unknown_is_predicted(&setting.patch_gains(&with, &search.last)?)
+    if let Some((patch, p_value)) = &search.patch
+        && *p_value <= FALSE_ALARM
+        && !unknown_is_predicted(&setting.patch_gains(&with, &search.last, patch)?)
     {
         search.patch = None;
     }

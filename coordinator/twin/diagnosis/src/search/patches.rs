@@ -7,6 +7,7 @@ use crate::candidate::Candidate;
 use crate::observation::Observation;
 use crate::patch_scan::{Fixed, Patch, PatchScan};
 use nalgebra::{DMatrix, DVector};
+use std::mem::discriminant;
 use std::ops::Range;
 use tracktwin_number::floored;
 
@@ -85,13 +86,16 @@ impl Setting<'_> {
         Ok(waves.filter(|waves| self.prepared.may_be_named(waves.kind)))
     }
 
-    /// Gain in nats on each speed, held out in turn, of the patch that the other speeds select. Empty for a
+    /// Gain in nats on each speed, held out in turn, of the patch that the other speeds select. It is one of
+    /// wavelength or of frequency as `found` is, because a single other speed does not tell them apart. Empty for a
     /// single speed.
     pub(super) fn patch_gains(
         &self,
         problem: &Problem<'_>,
         current: &Calibration,
+        found: &Patch,
     ) -> Result<Vec<f64>, CalibrationError> {
+        let is_alike = |fixed, _: &_| discriminant(&fixed) == discriminant(&found.fixed);
         let observation = &self.observe_with_cell_error(|_| false)?;
         let of_all = Problem { observation, ..*problem };
         let current = of_all.at(&current.values)?;
@@ -102,7 +106,7 @@ impl Setting<'_> {
             let without = Problem { observation, ..*problem };
             let others = without.at(&current.values)?;
             let scan = PatchScan::new(&without, &others);
-            let best = scan.best(&others.residual, &others.gradient, |_, _| true);
+            let best = scan.best(&others.residual, &others.gradient, is_alike);
             let gain = best.and_then(|best| {
                 let is_best = |fixed, sleepers: &Range<usize>| {
                     fixed == best.fixed && *sleepers == best.sleepers
