@@ -217,13 +217,7 @@ pub fn search(
         observation: &search.observation,
         candidates: &search.accepted,
     };
-    search.patch = setting.patch(&with, &search.last, |_, _| true)?;
-    if let Some((patch, p_value)) = &search.patch
-        && *p_value <= FALSE_ALARM
-        && !unknown_is_predicted(&setting.patch_gains(&with, &search.last, patch)?)
-    {
-        search.patch = None;
-    }
+    search.patch = setting.last_patch(&with, &search.last)?;
     let mean = |scores: &[f64]| scores.iter().sum::<f64>() / prepared.forward.count() as f64;
     search.held_out = [mean(&densities[0]), mean(&densities[search.accepted.len()])];
     Ok(search)

@@ -40,7 +40,7 @@ impl EvidenceThreshold<'_> {
     /// A shape that the inspection detected away from all accepted candidates is no residual of another
     /// effect and needs only the evidence of a first candidate.
     pub(super) fn of(self, candidate: &Candidate) -> f64 {
-        let alone = EVIDENCE_TEMPERING * 20_f64.ln();
+        let alone = first_evidence();
         if is_local_shape(candidate) && self.is_detected_by_passes(candidate) {
             return alone;
         }
@@ -84,6 +84,11 @@ impl EvidenceThreshold<'_> {
     pub(super) fn may_be_reached(self, candidate: &Candidate, gain: f64) -> bool {
         self.accepted.is_empty() || FITTED_GAIN * gain >= self.of(candidate)
     }
+}
+
+/// Smallest log evidence of a first candidate in nats: 9.
+pub(super) fn first_evidence() -> f64 {
+    EVIDENCE_TEMPERING * 20_f64.ln()
 }
 
 /// Whether a candidate is a local shape of the rail. It adds power there, and its model error does not look
