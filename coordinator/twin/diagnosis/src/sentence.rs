@@ -1,6 +1,7 @@
 //! Summary of a diagnosis in one or two sentences.
 
 use crate::outcome::{BeforeAfter, FitScores, Hypothesis, UNKNOWN, Verdict, meet};
+use crate::search::HELD_OUT_MIN;
 use std::collections::BTreeMap;
 use tracktwin_track::extension::{Kind, PlaceKind};
 
@@ -157,8 +158,11 @@ fn is_stretch(physics: &str) -> bool {
 
 fn gained(fit: &FitScores) -> String {
     let gain: f64 = fit.held_out_gain_nats.values().sum();
-    if gain <= 0.0 {
+    if fit.held_out_gain_nats.is_empty() {
         return String::new();
+    }
+    if gain < HELD_OUT_MIN {
+        return " Speeds that the model was not fitted to do not confirm it.".to_owned();
     }
     format!(
         " With what was found, the model predicts speeds that it was not fitted to better by {gain:.0} nats."
@@ -245,6 +249,9 @@ mod tests {
              railpad is missing or has lost most of its stiffness (missing_railpad, 99 %). With what \
              was found, the model predicts speeds that it was not fitted to better by 12 nats."
         );
+        let held_out_gain_nats = BTreeMap::from([("10".to_owned(), 6.0), ("13".to_owned(), -4.0)]);
+        let doubt = gained(&FitScores { held_out_gain_nats, ..fit });
+        assert_eq!(doubt, " Speeds that the model was not fitted to do not confirm it.");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::finding::{probability, seen};
 use super::notes::{lost, one_speed};
-use super::{MODEL_MAX, ONE_PASS_MAX, ONE_SPEED_MAX, verdict};
+use super::{MODEL_MAX, ONE_PASS_MAX, UNPREDICTED_MAX, verdict};
 use crate::outcome::{Diagnosis, FORMAT, FitScores, Hypothesis, Levels, Location, Score, Scores};
 use crate::prepared_recording::PreparationError;
 use std::collections::BTreeMap;
@@ -87,7 +87,7 @@ fn hypothesis(
     let is_tested = is_comb(finding.physics, inspection);
     let most = match (is_tested || kind.measuring_chain, recording.speeds_km_h().len()) {
         (true, _) => MODEL_MAX,
-        (false, 1) => ONE_SPEED_MAX,
+        (false, 1) => UNPREDICTED_MAX,
         (false, _) => ONE_PASS_MAX,
     };
     let location = match finding.place {

@@ -27,9 +27,9 @@ use tracktwin_inspection::wheel::Order;
 use tracktwin_signal::recording::Recording;
 use tracktwin_track::extension::Kind;
 
-/// Largest probability if no held-out speed could be tested: at a single speed, structure and geometry have
-/// the same effect.
-const ONE_SPEED_MAX: f64 = 0.5;
+/// Largest probability of what no held-out speed confirms: none could be held out, because at a single speed structure
+/// and geometry have the same effect, or unknown physics does not predict those that were.
+const UNPREDICTED_MAX: f64 = 0.5;
 
 /// Largest probability if no pass repeats another: the variation between passes is then an assumption.
 const ONE_PASS_MAX: f64 = 0.9;
@@ -139,7 +139,7 @@ impl Evidence<'_> {
     /// Largest probability that the recording permits.
     fn probability_max(&self) -> f64 {
         if self.speeds() == 1 {
-            ONE_SPEED_MAX
+            UNPREDICTED_MAX
         } else if self.repeats() {
             MODEL_MAX
         } else {

@@ -1,6 +1,6 @@
 //! Notes of a diagnosis.
 
-use super::{Evidence, ONE_PASS_MAX, ONE_SPEED_MAX};
+use super::{Evidence, ONE_PASS_MAX, UNPREDICTED_MAX};
 use crate::outcome::{Hypothesis, meet};
 use crate::port_scan::PortPlace;
 use tracktwin_inspection::{Finding, Inspection};
@@ -52,8 +52,10 @@ impl Evidence<'_> {
         if !round.unknown_is_predictive() {
             return Some(format!(
                 "A significant residual remains{place} (probability by chance {}), but it does \
-                     not predict a speed that is held out; a fixed cause would appear at every speed.",
-                chance(round.p_value)
+                     not predict a speed that is held out, which limits its probability to {:.0} %; a fixed \
+                     cause would appear at every speed.",
+                chance(round.p_value),
+                100.0 * UNPREDICTED_MAX
             ));
         }
         let rest = if self.search.accepted.is_empty() { "Something" } else { "A remainder" };
@@ -94,7 +96,7 @@ pub(super) fn one_speed(speed_km_h: f64) -> String {
         "One speed only: no test on a held-out speed was possible, which limits the \
              probability of a hypothesis that needs this test to {:.0} %. Add a pass at {:.0} \
              km/h or at {:.0} km/h.",
-        100.0 * ONE_SPEED_MAX,
+        100.0 * UNPREDICTED_MAX,
         speed_km_h / SPEED_RATIO,
         speed_km_h * SPEED_RATIO,
     )

@@ -1,7 +1,7 @@
 //! Hypotheses from the fits of a search.
 
 use super::finding::probability_of;
-use super::{Evidence, FAILED_SHARE, names};
+use super::{Evidence, FAILED_SHARE, UNPREDICTED_MAX, names};
 use crate::behaviour::Behaviour;
 use crate::estimate::Estimate;
 use crate::outcome::{Hypothesis, UNKNOWN, meet};
@@ -214,6 +214,7 @@ fn nameless(round: &Round, alone: bool) -> Nameless {
         (false, true) => unknown + (nothing - chance).max(0.0),
         (false, false) => unknown,
     };
+    let probability = if is_there { probability } else { probability.min(UNPREDICTED_MAX) };
     Nameless { accepted: is_port || like_names, like_names, names_failed, probability }
 }
 
@@ -244,6 +245,7 @@ fn nearest(round: &Round) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::outcome::Location;
+    use crate::port_scan::PortPlace;
     use tracktwin_parameters::TrackDesign;
 
     #[test]
@@ -262,6 +264,22 @@ mod tests {
         assert_eq!(of(1e-10, &[]), 1.0);
         let explained = Round { accepted: true, ..round(1e-10, &everywhere) };
         assert_eq!(chance_max(&explained), 1.0);
+    }
+
+    #[test]
+    fn something_that_held_out_speeds_do_not_have_is_not_sure() {
+        let change = nalgebra::DVector::zeros(0);
+        let port =
+            UnknownElement { place: PortPlace::Wheel, log_evidence: 60.0, behaviour: None, change };
+        let of = |unknown_gain: &[f64]| {
+            let (port, unknown_gain) = (Some(port.clone()), unknown_gain.to_vec());
+            let round =
+                Round { p_value: 1e-9, port_p_value: 1e-9, port, unknown_gain, ..Round::default() };
+            nameless(&round, true)
+        };
+        let (confirmed, refuted) = (of(&[6.0, 5.0, 4.0]), of(&[6.0, -2.0, -2.0]));
+        assert!(confirmed.accepted && refuted.accepted);
+        assert!(confirmed.probability > 0.99 && refuted.probability == UNPREDICTED_MAX);
     }
 
     #[test]
