@@ -3,6 +3,7 @@
 use crate::pipeline::compute::compute;
 use crate::pipeline::diagnose::{Compared, DiagnosingError, Setting, diagnose};
 use tracktwin_diagnosis::{ConfirmationError, Confirming, Diagnosis, are_one_speed};
+use tracktwin_inspection::inspect;
 use tracktwin_signal::recording::Recording;
 
 /// Errors of confirming a diagnosis.
@@ -40,7 +41,10 @@ pub async fn diagnose_and_confirm(
     setting: Setting<'_>,
     watch: &(dyn Fn(&'static str, f64) + Sync),
 ) -> Result<Diagnosis, ConfirmingError> {
-    let (kept, withheld) = withhold(recording).ok_or(ConfirmingError::NoPass)?;
+    let inspection = compute(|| inspect(recording));
+    let (kept, withheld) =
+        withhold(recording, &inspection.not_compared()).ok_or(ConfirmingError::NoPass)?;
+    let withheld = compute(|| inspection.without_hum(&withheld));
     let diagnosed = diagnose(&kept, setting, watch).await?;
     let mut diagnosis = diagnosed.diagnosis;
     if let Some(Compared { prepared, search, null }) = &diagnosed.compared {
@@ -54,25 +58,26 @@ pub async fn diagnose_and_confirm(
 
 /// Whether some speed of a recording has at least two passes.
 pub fn has_pass_to_withhold(recording: &Recording) -> bool {
-    !withheld(recording).is_empty()
+    !withheld(recording, &[]).is_empty()
 }
 
-/// Numbers of the last pass of each speed that has two or more.
-fn withheld(recording: &Recording) -> Vec<usize> {
+/// Numbers of the last pass of each speed that has two or more, among all passes but those with the numbers `except`.
+fn withheld(recording: &Recording, except: &[usize]) -> Vec<usize> {
     let passes = &recording.passes;
-    let is_of =
-        |one: usize, other: usize| are_one_speed(passes[one].speed_km_h, passes[other].speed_km_h);
+    let is_of = |one: usize, other: usize| {
+        !except.contains(&other) && are_one_speed(passes[one].speed_km_h, passes[other].speed_km_h)
+    };
     let is_last = |&pass: &usize| {
         let repeats = (0..pass).any(|other| is_of(pass, other));
         repeats && !(pass + 1..passes.len()).any(|other| is_of(pass, other))
     };
-    (0..passes.len()).filter(is_last).collect()
+    (0..passes.len()).filter(|pass| !except.contains(pass)).filter(is_last).collect()
 }
 
 /// Splits a recording: without the last pass of each speed that has two or more passes, and these passes
-/// alone. Returns `None` if there is no such speed.
-fn withhold(recording: &Recording) -> Option<(Recording, Recording)> {
-    let last = withheld(recording);
+/// alone. The passes with the numbers `except` are not withheld. Returns `None` if there is no such speed.
+fn withhold(recording: &Recording, except: &[usize]) -> Option<(Recording, Recording)> {
+    let last = withheld(recording, except);
     let of = |is_withheld: bool| {
         let passes = recording.passes.iter().enumerate();
         let wanted = passes.filter(|(pass, _)| last.contains(pass) == is_withheld);
@@ -107,10 +112,15 @@ mod tests {
             spacing_m: 0.125,
             doubts: Vec::new(),
         };
-        let (kept, withheld) = withhold(&recording(&[13.0, 10.0, 13.1, 7.0, 12.9])).unwrap();
+        let of = |speeds: &[f64], except: &[usize]| withhold(&recording(speeds), except);
+        let (kept, withheld) = of(&[13.0, 10.0, 13.1, 7.0, 12.9], &[]).unwrap();
         let files = |it: &Recording| it.passes.iter().map(|it| it.file.clone()).collect::<Vec<_>>();
         assert_eq!(files(&kept), ["0", "1", "2", "3"]);
         assert_eq!(files(&withheld), ["4"]);
-        assert!(withhold(&recording(&[13.0, 10.0, 7.0])).is_none());
+        let (kept, withheld) = of(&[13.0, 10.0, 13.1, 7.0, 12.9], &[4]).unwrap();
+        assert_eq!(files(&kept), ["0", "1", "3", "4"]);
+        assert_eq!(files(&withheld), ["2"]);
+        assert!(of(&[13.0, 10.0, 7.0], &[]).is_none());
+        assert!(of(&[13.0, 13.1, 10.0], &[0]).is_none());
     }
 }

@@ -30,6 +30,7 @@ pub enum NullModelError {
 struct Key<'a> {
     model_hash: &'static str,
     design: &'a TrackDesign,
+    wavelengths_m: [f64; 2],
     sleepers: usize,
     version: u32,
     speeds_m_s: &'a [f64],
@@ -55,6 +56,7 @@ pub async fn of(
     let key = Key {
         model_hash: MODEL_HASH,
         design: &forward.section.track.design,
+        wavelengths_m: forward.section.track.wavelengths_m,
         sleepers: forward.section.sleepers,
         version: NullModel::VERSION,
         speeds_m_s: &forward.speeds_m_s,

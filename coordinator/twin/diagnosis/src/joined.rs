@@ -4,12 +4,13 @@ mod hypotheses;
 
 use crate::conclusion::{further, verdict};
 use crate::outcome::{
-    BeforeAfter, Confirmation, Diagnosis, FORMAT, FitScores, Levels, Mismatch, Score, Scores,
-    SectionVerdict, Verdict,
+    BeforeAfter, Confirmation, ConfirmedSpeed, Diagnosis, FORMAT, FitScores, Levels, Mismatch,
+    Score, Scores, SectionVerdict, Verdict,
 };
 use crate::prepared_recording::overlapping;
 use crate::section::owner;
 use crate::sentence::sentence;
+use crate::spectra::are_one_speed;
 use crate::variation::joined_support_changes;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -197,13 +198,18 @@ impl Whole<'_> {
         sums.into_iter().map(|(name, sum)| (name, mean(sum))).collect()
     }
 
-    /// Levels of all sleepers; none if the sections were compared in different bands.
+    /// Levels of all sleepers; none if the sections were compared in different bands or at different speeds.
     fn levels(&self) -> Levels {
         let all: Vec<&Levels> = self.sections.iter().map(|it| &it.diagnosis.levels).collect();
         let first = all[0];
         let is_alike = |levels: &&Levels| {
             levels.frequency_hz == first.frequency_hz
                 && levels.speeds_km_h.len() == first.speeds_km_h.len()
+                && levels
+                    .speeds_km_h
+                    .iter()
+                    .zip(&first.speeds_km_h)
+                    .all(|(a, b)| are_one_speed(*a, *b))
         };
         if !all.iter().all(is_alike) {
             return Levels::default();
@@ -238,10 +244,20 @@ impl Whole<'_> {
         for other in all {
             let [a, b] = [whole.sleepers, other.sleepers].map(|sleepers| sleepers as f64);
             let mean = |one: f64, two: f64| ((a * one * one + b * two * two) / (a + b)).sqrt();
-            for (speed, further) in whole.speeds.iter_mut().zip(&other.speeds) {
-                speed.before_db = mean(speed.before_db, further.before_db);
-                speed.after_db = mean(speed.after_db, further.after_db);
+            for further in &other.speeds {
+                let is_it = |known: &&mut ConfirmedSpeed| {
+                    are_one_speed(known.speed_km_h, further.speed_km_h)
+                };
+                if let Some(speed) = whole.speeds.iter_mut().find(is_it) {
+                    speed.before_db = mean(speed.before_db, further.before_db);
+                    speed.after_db = mean(speed.after_db, further.after_db);
+                } else {
+                    whole.speeds.push(further.clone());
+                }
             }
+            let is_new = |file: &&String| !whole.passes.contains(file);
+            let further: Vec<String> = other.passes.iter().filter(is_new).cloned().collect();
+            whole.passes.extend(further);
             whole.sleepers += other.sleepers;
             whole.gain_nats += other.gain_nats;
             whole.is_confirmed &= other.is_confirmed;

@@ -75,7 +75,10 @@ pub enum PreparationError {
         spacing_m: f64,
     },
     /// The sensor gain is unknown, and the levels have no unit.
-    #[error("recording.json: nominal.gain_known: is false; the model needs accelerations in m/s2")]
+    #[error(
+        "recording.json: nominal.gain_known: is false; the model needs accelerations in m/s2: import again with \
+         `--unit m/s2` or `--unit g`"
+    )]
     GainUnknown,
     /// The positions of the sleepers are unknown.
     #[error(
@@ -172,7 +175,8 @@ impl Measured {
         except: &[usize],
     ) -> Result<Self, PreparationError> {
         check_track(recording, design)?;
-        let fastest = recording.passes.iter().map(|pass| pass.speed_km_h).fold(0.0, f64::max);
+        let compared = recording.passes.iter().enumerate().filter(|(it, _)| !except.contains(it));
+        let fastest = compared.map(|(_, pass)| pass.speed_km_h).fold(0.0, f64::max);
         let lowest_hz = LOWEST_PERIODS * fastest / 3.6 / design.sleeper.spacing_m;
         let highest_hz = highest_compared_hz(recording.sample_rate_hz);
         let bands = Bands::new(lowest_hz, highest_hz.max(lowest_hz));
@@ -185,7 +189,7 @@ impl Measured {
         if !recording.gain_known() {
             return Err(PreparationError::GainUnknown);
         }
-        let sleepers = covered(recording);
+        let sleepers = covered(recording, except);
         if sleepers.len() < SLEEPERS_MIN {
             let margin_m = MARGIN_SPANS * recording.spacing_m;
             return Err(PreparationError::TooShort { sleepers: sleepers.len(), margin_m });

@@ -110,6 +110,9 @@ impl Evidence<'_> {
             })
         };
         let near: Vec<usize> = (0..section.sleepers).filter(at_place).collect();
+        if near.is_empty() {
+            return BTreeMap::new();
+        }
         let unknowns = &self.prepared.forward.unknowns;
         let of = |value: &dyn Fn(&DVector<f64>) -> f64| BeforeAfter {
             before: value(&self.search.baseline.values),

@@ -46,7 +46,7 @@ impl Evidence<'_> {
         }
     }
 
-    /// A stretch in m, with the sleepers that are at most half a spacing away.
+    /// A stretch in m, with the sleepers that are at most half a spacing away, or the nearest one.
     pub(super) fn location_between(&self, from_m: f64, to_m: f64) -> Location {
         let section = &self.prepared.forward.section;
         let half_m = (0.5 + PLACE_ERROR) * section.track.design.sleeper.spacing_m;
@@ -54,8 +54,13 @@ impl Evidence<'_> {
             let x_m = section.x_m(*sleeper);
             from_m - half_m <= x_m && x_m <= to_m + half_m
         };
-        let sleepers = (0..section.sleepers).filter(near).map(|sleeper| self.id(sleeper));
-        Location { x_m: [from_m, to_m], sleepers: sleepers.collect() }
+        let mut sleepers: Vec<usize> = (0..section.sleepers).filter(near).collect();
+        if sleepers.is_empty() {
+            let is_before = to_m < section.x_m(0);
+            sleepers.push(if is_before { 0 } else { section.sleepers - 1 });
+        }
+        let ids = sleepers.into_iter().map(|sleeper| self.id(sleeper));
+        Location { x_m: [from_m, to_m], sleepers: ids.collect() }
     }
 
     pub(super) fn location_of_finding(&self, finding: &Finding) -> Option<Location> {

@@ -1,6 +1,6 @@
 //! Hypotheses of a long track, from those of its sections.
 
-use super::Whole;
+use super::{DiagnosedSection, Whole};
 use crate::estimate::Estimate;
 use crate::outcome::{Hypothesis, Location, meet};
 use tracktwin_track::extension::{Kind, PlaceKind};
@@ -18,6 +18,7 @@ impl Whole<'_> {
         for (section, diagnosed) in self.sections.iter().enumerate() {
             let placed = |hypothesis: &Hypothesis| self.placed(section, hypothesis.clone());
             let all = diagnosed.diagnosis.hypotheses.iter().map(placed);
+            let all = all.filter(|it| !self.is_of_another(section, it));
             found.extend(all.map(|hypothesis| Found { section, hypothesis }));
         }
         let kept = found.iter().filter(|one| !found.iter().any(|other| self.replaces(other, one)));
@@ -29,6 +30,19 @@ impl Whole<'_> {
             }
         }
         joined
+    }
+
+    /// Whether a hypothesis lies beyond the sleepers of its section and at those of another one. Passes reach a few
+    /// spans beyond a section.
+    fn is_of_another(&self, section: usize, hypothesis: &Hypothesis) -> bool {
+        let Some(place) = &hypothesis.location else { return false };
+        let nearest = |x_m: f64| {
+            let distance = |index: &usize| (self.x_m[*index] - x_m).abs();
+            (0..self.x_m.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        };
+        let [Some(first), Some(last)] = place.x_m.map(nearest) else { return false };
+        let holds = |it: &DiagnosedSection| it.sleepers.start <= last && first < it.sleepers.end;
+        !holds(&self.sections[section]) && self.sections.iter().any(holds)
     }
 
     /// A hypothesis on all sleepers of a section refers to the section's own sleepers.

@@ -99,6 +99,44 @@ fn of_two_names_for_one_place_the_section_that_has_it_farther_inside_decides() {
 }
 
 #[test]
+fn what_a_section_hears_beyond_its_sleepers_is_the_next_section_s() {
+    let mut beyond = at("rail_joint", &[32]);
+    beyond["location"]["sleepers"] = json!(["SN30"]);
+    let diagnosis = whole(std::slice::from_ref(&beyond), &[at("rail_joint", &[32])]);
+    assert_eq!(places(&diagnosis), [("rail_joint", ["SN33", "SN33"])]);
+    // Beyond the last sleeper of all, no other section has it.
+    let mut last = at("squat", &[53]);
+    last["location"]["x_m"] = json!([33.0, 33.0]);
+    assert_eq!(places(&whole(&[], &[last])), [("squat", ["SN54", "SN54"])]);
+}
+
+#[test]
+fn withheld_passes_of_sections_are_joined_by_their_speeds() {
+    let confirmed = |sleepers: Range<usize>, of: &[(&str, f64)]| {
+        let mut it = section(sleepers, &[]);
+        let speeds: Vec<_> = of
+            .iter()
+            .map(|(_, speed)| json!({"speed_km_h": speed, "before_dB": *speed, "after_dB": 1.0}))
+            .collect();
+        let passes: Vec<_> = of.iter().map(|(file, _)| file).collect();
+        it.diagnosis.confirmation = serde_json::from_value(json!({"passes": passes,
+            "speeds": speeds, "sleepers": 30, "gain_nats": 5.0, "is_confirmed": true}))
+        .unwrap();
+        it
+    };
+    let sections = [
+        confirmed(0..30, &[("slow", 40.0), ("usual", 60.0)]),
+        confirmed(24..54, &[("usual", 60.0), ("fast", 80.0)]),
+    ];
+    let x_m: Vec<f64> = (0..54).map(|sleeper| 0.6 * f64::from(sleeper)).collect();
+    let whole = joined(&ids(), &x_m, &sections, None).unwrap().confirmation.unwrap();
+    assert_eq!(whole.passes, ["slow", "usual", "fast"]);
+    let speeds: Vec<f64> = whole.speeds.iter().map(|it| it.speed_km_h).collect();
+    assert_eq!(speeds, [40.0, 60.0, 80.0]);
+    assert!(whole.speeds.iter().all(|it| (it.before_db - it.speed_km_h).abs() < 1e-9));
+}
+
+#[test]
 fn what_continues_in_the_next_section_is_one_finding() {
     let bolts = |sd: f64| {
         let mut bolts = at("sleeper_bolt", &(24..54).collect::<Vec<_>>());

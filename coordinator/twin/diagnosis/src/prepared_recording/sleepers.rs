@@ -4,13 +4,14 @@ use super::MARGIN_SPANS;
 use std::ops::Range;
 use tracktwin_signal::recording::Recording;
 
-/// The longest run of neighbouring sleepers that every pass covers with a margin.
-pub(super) fn covered(recording: &Recording) -> Range<usize> {
+/// The longest run of neighbouring sleepers that every pass covers with a margin, without the passes with the indices
+/// `except`.
+pub(super) fn covered(recording: &Recording, except: &[usize]) -> Range<usize> {
     let reach_m = (0.5 + MARGIN_SPANS) * recording.spacing_m;
     let inside = |x_m: f64| {
-        recording.passes.iter().all(|pass| {
+        recording.passes.iter().enumerate().all(|(number, pass)| {
             let (first, last) = (pass.position_m[0], pass.position_m[pass.position_m.len() - 1]);
-            first <= x_m - reach_m && x_m + reach_m <= last
+            except.contains(&number) || (first <= x_m - reach_m && x_m + reach_m <= last)
         })
     };
     let mut longest = 0..0;

@@ -210,8 +210,8 @@ pub fn search(
         && search.search_round(&setting, all, &mut densities, progress)?
     {}
     search.retract_names(&prepared.forward.section);
-    search.estimates = search.estimates(&prepared.forward)?;
     search.compare_speeds(&setting)?;
+    search.estimates = search.estimates(&prepared.forward)?;
     let with = Problem {
         forward: &prepared.forward,
         observation: &search.observation,

@@ -1,10 +1,11 @@
 //! Probability of each explanation of a search: tempered evidence times prior.
 
 use super::{Fitted, Round};
-use crate::port_scan::UnknownElement;
+use crate::candidate::Candidate;
+use crate::port_scan::{PortPlace, UnknownElement};
 use crate::screen::STRENGTHS;
 use std::collections::BTreeMap;
-use tracktwin_track::extension::{Kind, LookAlikeGroup};
+use tracktwin_track::extension::{Kind, LookAlikeGroup, PlaceKind};
 
 /// Divisor of log evidence (tempering): the model is not exact, and its errors are correlated.
 pub(crate) const EVIDENCE_TEMPERING: f64 = 3.0;
@@ -25,8 +26,8 @@ const UNKNOWN_PRIOR: f64 = 0.1;
 /// is not exact. Unknown physics is free at every frequency and fits model errors as well.
 const EXPLAINED_SHARE: f64 = 2.0 / 3.0;
 
-/// The same for a linear kind. Of our own model it explains more than unknown physics; on a recording of another
-/// simulator a flexible axle box explained 0.968 of it.
+/// The same for a linear kind at the place of the unknown physics. Of our own model it explains more than unknown
+/// physics; on a recording of another simulator a flexible axle box explained 0.968 of it.
 const EXPLAINED_SHARE_LINEAR: f64 = 0.95;
 
 /// Smallest prior of nothing being left out.
@@ -64,10 +65,26 @@ impl Round {
     pub(super) fn against(&self, unknown: Option<&UnknownElement>) -> Probabilities {
         let of_fitted = |fitted: &Fitted| (fitted.log_evidence, fitted.candidate.kind.group);
         let named: Vec<_> = self.fitted.iter().map(of_fitted).collect();
-        let is_linear = self.fitted.first().is_some_and(|best| best.candidate.is_linear());
-        let explained_share = if is_linear { EXPLAINED_SHARE_LINEAR } else { EXPLAINED_SHARE };
+        let explained_share = match (self.fitted.first(), unknown) {
+            (Some(best), Some(port)) => explained_share(&best.candidate, &port.place),
+            _ => 1.0,
+        };
         let unknown = unknown.map(|port| port.log_evidence);
         tempered(&named, unknown, explained_share, self.unseen)
+    }
+}
+
+/// Share of the evidence for unknown physics at `port` from which a candidate explains it.
+fn explained_share(candidate: &Candidate, port: &PortPlace) -> f64 {
+    let is_there = match port {
+        PortPlace::Wheel => candidate.kind.place == PlaceKind::Nowhere,
+        PortPlace::Seats(seats) => candidate.extension.sleepers.as_ref() == Some(seats),
+        PortPlace::Between(_) => false,
+    };
+    match (candidate.is_linear(), is_there) {
+        (true, true) => EXPLAINED_SHARE_LINEAR,
+        (true, false) => 1.0,
+        (false, _) => EXPLAINED_SHARE,
     }
 }
 
@@ -142,6 +159,7 @@ fn tempered(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::search::testing::section_with_candidates;
 
     /// Names of different groups.
     fn apart(evidences: &[f64]) -> Vec<(f64, LookAlikeGroup)> {
@@ -189,6 +207,21 @@ mod tests {
         let prior = 0.5 / Kind::all().count() as f64;
         assert!((named[0] - prior / (0.5 + prior)).abs() < 1e-12);
         assert_eq!(unknown, 0.0);
+    }
+
+    #[test]
+    fn a_linear_kind_need_not_explain_all_that_is_unknown_at_its_own_place() {
+        let (_, all) = section_with_candidates();
+        let named = |wanted: &str| all.iter().find(|it| it.kind.physics == wanted).unwrap();
+        let seats = |of: &[usize]| PortPlace::Seats(of.to_vec());
+        let axle_box = named("flexible_axle_box");
+        assert_eq!(explained_share(axle_box, &PortPlace::Wheel), EXPLAINED_SHARE_LINEAR);
+        assert_eq!(explained_share(axle_box, &seats(&[0, 1, 2])), 1.0);
+        let pad = named("missing_railpad");
+        let under = pad.extension.sleepers.clone().unwrap();
+        assert_eq!(explained_share(pad, &seats(&under)), EXPLAINED_SHARE_LINEAR);
+        assert_eq!(explained_share(pad, &PortPlace::Wheel), 1.0);
+        assert_eq!(explained_share(named("hanging_sleeper"), &PortPlace::Wheel), EXPLAINED_SHARE);
     }
 
     #[test]
