@@ -318,7 +318,7 @@ impl LibraryError {
     }
 
     /// Whether the data that were read are invalid, in contrast to a failure of reading.
-    pub(crate) fn is_of_the_data(&self) -> bool {
+    pub fn is_of_the_data(&self) -> bool {
         match self {
             Self::Malformed { .. } | Self::Damaged { .. } | Self::Altered { .. } => true,
             Self::Database(error) => {

@@ -34,11 +34,14 @@ impl LeaseKind {
     }
 }
 
-/// Maximum difference of a one-third-octave level between two correct workers, in dB.
+/// Maximum difference of a one-third-octave level or of a bin's power between two correct workers, in dB.
 ///
 /// Correct machines differ only by rounding, if their vector units add in a different order. This
 /// difference is far below 0.01 dB. The random surface causes an uncertainty of about 0.3 dB in a level.
 const TOLERANCE_DB: f64 = 0.05;
+
+/// Difference in dB of powers whose natural logarithms differ by 1.
+const DB_PER_LN: f64 = 10.0 * std::f64::consts::LOG10_E;
 
 /// Number of cases of an audit lease: one group.
 const CASES: u32 = tracktwin_worker::agent::GROUP as u32;
@@ -230,17 +233,22 @@ pub(crate) enum AuditOutcome {
     },
 }
 
-/// Largest difference of a one-third-octave level between the stored and the new result, in dB.
+/// Largest difference of a one-third-octave level or of a bin's power, on which models are trained, between the
+/// stored and the new result, in dB.
 fn difference(stored: &[Features], found: &Outcome) -> f64 {
     let Outcome::Finished(passes) = found else { return f64::INFINITY };
     if passes.len() != stored.len() {
         return f64::INFINITY;
     }
-    let pairs = stored
-        .iter()
-        .zip(passes)
-        .flat_map(|(stored, pass)| stored.band_levels_db.iter().zip(&pass.features.band_levels_db));
-    pairs.map(|(stored, found)| (stored - found).abs()).fold(0.0, f64::max)
+    let largest = |stored: &[f64], found: &[f64]| {
+        stored.iter().zip(found).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
+    let pairs = stored.iter().zip(passes.iter().map(|pass| &pass.features));
+    let of_pass = pairs.map(|(stored, found)| {
+        let levels_db = largest(&stored.band_levels_db, &found.band_levels_db);
+        levels_db.max(DB_PER_LN * largest(&stored.log_power, &found.log_power))
+    });
+    of_pass.fold(0.0, f64::max)
 }
 
 #[cfg(test)]
@@ -264,5 +272,17 @@ mod tests {
         assert_eq!(difference(&stored, &short), f64::INFINITY);
         let failed = Outcome::Failed { reason: "?".to_owned() };
         assert_eq!(difference(&stored, &failed), f64::INFINITY);
+    }
+
+    #[test]
+    fn the_powers_that_models_are_trained_on_are_compared_too() {
+        let features = |ln: f64| Features { log_power: vec![2.0, ln], band_levels_db: vec![1.0] };
+        let pass = PassFeatures {
+            speed_km_h: 7.0,
+            features: features(3.0 + 0.1 * std::f64::consts::LN_10),
+            contact_loss_share: None,
+        };
+        let found = Outcome::Finished(vec![pass]);
+        assert!((difference(&[features(3.0)], &found) - 1.0).abs() < 1e-12);
     }
 }

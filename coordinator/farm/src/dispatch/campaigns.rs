@@ -24,6 +24,13 @@ pub enum DispatchError {
     },
 }
 
+impl DispatchError {
+    /// Whether later calls fail too: this version cannot simulate the campaign, or its stored data are invalid.
+    pub(crate) const fn is_lasting(&self) -> bool {
+        matches!(self, Self::Experiment { .. } | Self::Library(LibraryError::Damaged { .. }))
+    }
+}
+
 /// A campaign with the values that its messages need.
 pub(crate) struct Served {
     pub(crate) record: CampaignRecord,
@@ -88,5 +95,22 @@ impl Campaigns {
         let latest = self.latest.lock();
         let unknown = || LeaseSizer::default().cases_per_lease(cores);
         latest.as_ref().map_or_else(unknown, |it| it.cases_per_lease(cores))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_library_that_is_away_is_no_reason_to_give_a_campaign_up() {
+        let away = || LibraryError::Unavailable { reason: "no response".to_owned() };
+        for error in [away(), LibraryError::DiskFull, LibraryError::Busy, LibraryError::Closed] {
+            assert!(!DispatchError::Library(error).is_lasting());
+        }
+        let source = Experiment::from_json("?").unwrap_err();
+        assert!(DispatchError::Experiment { campaign: "c".to_owned(), source }.is_lasting());
+        let damaged = LibraryError::Damaged { what: "campaign c: speeds_km_h".to_owned() };
+        assert!(DispatchError::Library(damaged).is_lasting());
     }
 }

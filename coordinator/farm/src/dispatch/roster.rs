@@ -31,6 +31,8 @@ struct Worker {
     /// Reason of the quarantine, if the worker is in quarantine.
     quarantine: Option<String>,
     breaker: Breaker,
+    /// Whether a case has succeeded since the registration.
+    has_succeeded: bool,
 }
 
 /// Whether a worker may get cases.
@@ -64,7 +66,14 @@ impl Roster {
         let name = registration.worker.clone();
         // A restart of the connection forgives nothing.
         let breaker = workers.get(&name).map(|worker| worker.breaker).unwrap_or_default();
-        let worker = Worker { registration, heard_of: now, noted: now, quarantine: None, breaker };
+        let worker = Worker {
+            registration,
+            heard_of: now,
+            noted: now,
+            quarantine: None,
+            breaker,
+            has_succeeded: false,
+        };
         workers.insert(name, worker);
         Ok(())
     }
@@ -109,10 +118,11 @@ impl Roster {
         let mut workers = self.0.lock();
         let Some(it) = workers.get_mut(worker) else { return false };
         it.breaker.reported(failed.iter().copied());
+        it.has_succeeded |= failed.contains(&false);
         let present = |it: &Worker| it.heard_of.elapsed() < PRESENT;
         let failing = it.breaker.is_failing();
         let others = workers.iter().filter(|(name, it)| *name != worker && present(it));
-        let mut sound = others.filter(|(_, it)| !it.breaker.is_failing());
+        let mut sound = others.filter(|(_, it)| it.has_succeeded && !it.breaker.is_failing());
         let suspended = failing && sound.next().is_some();
         if suspended && let Some(it) = workers.get_mut(worker) {
             it.breaker.open(Instant::now());
@@ -152,6 +162,7 @@ mod tests {
     #[test]
     fn a_worker_that_fails_where_others_do_not_is_put_aside_and_then_on_trial() {
         let roster = roster(&["bad", "good"]);
+        assert!(!roster.reported("good", &[false]));
         assert!(roster.reported("bad", &[true; 8]));
         let eligibility = roster.eligibility("bad").unwrap();
         assert!(eligibility.exclusion.is_some() && eligibility.on_trial);
@@ -161,8 +172,8 @@ mod tests {
     #[test]
     fn where_everybody_fails_nobody_is_put_aside() {
         let roster = roster(&["a", "b"]);
-        assert!(roster.reported("a", &[true; 8]), "b has not failed yet");
-        assert!(!roster.reported("b", &[true; 7]));
+        assert!(!roster.reported("a", &[true; 8]), "b has reported nothing yet");
+        assert!(!roster.reported("b", &[true; 8]));
         let alone = self::roster(&["alone"]);
         assert!(!alone.reported("alone", &[true; 100]));
         assert!(alone.eligibility("alone").unwrap().exclusion.is_none());

@@ -163,6 +163,8 @@ async fn a_worker_that_fails_where_another_does_not_is_put_aside() {
     let coordinator = serving(0.0).await;
     let mut client = registered(&coordinator, "bad").await;
     client.register(registration("good", MODEL_HASH)).await.unwrap();
+    let leased = lease(&mut client, "good").await;
+    client.report(report(&leased, "good")).await.unwrap();
     for _ in 0..2 {
         let leased = lease(&mut client, "bad").await;
         let failed = |case: &messages::LeasedCase| {

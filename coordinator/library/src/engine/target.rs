@@ -34,7 +34,7 @@ impl Target {
             Some(path) if !path.is_empty() && !path.starts_with(':') => {
                 Ok(Self::Sqlite(PathBuf::from(path)))
             }
-            _ => Err(LibraryError::UnknownUrl { url: url.to_owned() }),
+            _ => Err(LibraryError::UnknownUrl { url: unknown(url) }),
         }
     }
 
@@ -56,17 +56,34 @@ impl Target {
 }
 
 /// Returns a library's URL for messages, pages and command lines. The password is removed, and so are the
-/// settings, which may contain a password.
+/// settings, which may contain a password. A path of `SQLite` and a text without `://` stay as they are.
+///
+/// A `?` before the last `@` belongs to a password or begins the settings. Then the rest after the first name, which
+/// is the user or the host, is left out.
 pub fn without_password(url: &str) -> String {
     let Some((scheme, rest)) =
-        url.split_once("://").filter(|(scheme, _)| scheme.contains("postgres"))
+        url.split_once("://").filter(|(scheme, _)| !scheme.ends_with("sqlite"))
     else {
         return url.to_owned();
     };
-    let rest = rest.split_once('?').map_or(rest, |(rest, _)| rest);
-    let Some((login, host)) = rest.rsplit_once('@') else { return format!("{scheme}://{rest}") };
-    let user = login.split_once(':').map_or(login, |(user, _)| user);
-    format!("{scheme}://{user}@{host}")
+    let before = |text: &str, ends: &[char]| text.split(ends).next().unwrap_or_default().to_owned();
+    match rest.rsplit_once('@') {
+        None => format!("{scheme}://{}", before(rest, &['?'])),
+        Some((login, _)) if login.contains('?') => {
+            format!("{scheme}://{}...", before(login, &[':', '/', '?', '@']))
+        }
+        Some((login, host)) => {
+            format!("{scheme}://{}@{}", before(login, &[':']), before(host, &['?']))
+        }
+    }
+}
+
+/// Text of an unknown URL for the message. A login without `://` before it is removed completely.
+fn unknown(url: &str) -> String {
+    match url.rsplit_once('@') {
+        Some((_, host)) if !url.contains("://") => format!("...@{host}"),
+        _ => without_password(url),
+    }
 }
 
 #[cfg(test)]
@@ -106,5 +123,22 @@ mod tests {
         }
         let message = refusal("postgres://me:secret@host:port/db");
         assert!(message.contains("host:port") && !message.contains("secret"), "{message}");
+    }
+
+    #[test]
+    fn no_message_shows_the_password_of_a_wrong_url() {
+        for (url, shown) in [
+            ("postgre://me:secret@host/db", "postgre://me@host/db"),
+            ("postgre://host/db?password=secret", "postgre://host/db"),
+            ("postgres://me:se/cret@host:port/db", "postgres://me@host:port/db"),
+            ("postgres://me:se?cret@host/db", "postgres://me..."),
+            ("postgre://host/db?password=se@cret", "postgre://host..."),
+            ("postgres:me:secret@host/db", "...@host/db"),
+        ] {
+            let message = refusal(url);
+            assert!(message.starts_with(&format!("library {shown}: ")), "{message}");
+            assert!(!message.contains("cret"), "{message}");
+        }
+        assert_eq!(without_password("postgres://me:s@e?cret@host/db"), "postgres://me...");
     }
 }

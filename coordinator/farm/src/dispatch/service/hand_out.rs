@@ -22,10 +22,6 @@ const IDLE_CALLS_S: f64 = 400.0;
 impl Dispatch {
     /// Leases cases to a worker that may get cases.
     pub(super) async fn hand_out(&self, worker: &str, cases_max: u32) -> Result<Lease, Status> {
-        let failed = |error: &DispatchError| {
-            tracing::error!("cannot lease cases: {error}");
-            Status::unavailable(error.to_string())
-        };
         let audit = self.audits.lease(worker, cases_max, &self.campaigns).await;
         if let Some(lease) = audit.map_err(|error| unavailable(&error))? {
             return Ok(Lease::Cases(lease));
@@ -60,22 +56,27 @@ impl Dispatch {
                 Ok(Lease::Cases(served.lease(cases.collect())))
             }
             Err(error) => {
-                self.give_up_campaign(worker, &leased).await;
-                Err(failed(&error))
+                self.take_back(worker, &leased, &error).await;
+                Err(Status::unavailable(error.to_string()))
             }
         }
     }
 
-    /// Pauses a campaign that this version cannot simulate, so that other campaigns are served.
-    async fn give_up_campaign(&self, worker: &str, leased: &library::Lease) {
+    /// Releases leased cases that cannot be handed out. A campaign that this version cannot serve is paused, so
+    /// that other campaigns are served. After an error of the library the next request may succeed.
+    async fn take_back(&self, worker: &str, leased: &library::Lease, error: &DispatchError) {
+        let campaign = &leased.campaign;
         let held = leased.cases.iter();
         let held = held.map(|it| library::Held { index: it.case.index, epoch: it.epoch });
-        let released = self.library.release(&leased.campaign, worker, held.collect()).await;
-        let paused = self.library.pause(&leased.campaign).await;
+        let released = self.library.release(campaign, worker, held.collect()).await;
+        if !error.is_lasting() {
+            tracing::error!("cannot lease cases of campaign {campaign}: {error} ({released:?})");
+            return;
+        }
+        let paused = self.library.pause(campaign).await;
         tracing::error!(
-            "campaign {} is paused, because this version cannot simulate it; use the version that \
-             added it ({released:?}, {paused:?})",
-            leased.campaign
+            "campaign {campaign} is paused, because this version cannot serve it ({error}); use the version \
+             that added it, or repair the library and resume the campaign ({released:?}, {paused:?})"
         );
     }
 
