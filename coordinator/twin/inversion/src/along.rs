@@ -4,8 +4,8 @@ use crate::fit::Fitted;
 use crate::record::{Along, Inversion, Prior, Provenance, Sleeper, log_normal};
 use std::collections::BTreeMap;
 use tracktwin_diagnosis::{
-    Common, FoundSupportChange, Mean, Own, PreparedRecording, Unknowns, joined_support_changes,
-    owner,
+    Amplitude, Common, FoundSupportChange, Mean, Own, PreparedRecording, Unknowns,
+    joined_support_changes, owner,
 };
 use tracktwin_evaluation::{Estimates, Flag, Unevaluated};
 use tracktwin_parameters::Parameter;
@@ -18,6 +18,9 @@ const MISFIT_MAX: f64 = 2.0;
 /// the recording. For other tracks it is multiplied by the length ratio (docs/inversion.md; paper, Table
 /// D1).
 const RAILPAD_RESOLVED: f64 = 2e8;
+
+/// Largest probability of a support change if all passes have one speed: a change of the surface has a similar effect.
+const ONE_SPEED_MAX: f64 = 0.5;
 
 impl Inversion {
     /// Combines the sections of a recording, which must be in order. A sleeper that lies in several
@@ -52,8 +55,15 @@ fn support_changes(
     (prepared, fitted): &(PreparedRecording, Fitted),
 ) -> Vec<FoundSupportChange> {
     let id = |sleeper: usize| recording.sleepers[prepared.first_sleeper + sleeper].id.clone();
+    let most = if prepared.forward.speeds_m_s.len() == 1 { ONE_SPEED_MAX } else { 1.0 };
+    let limited = |amplitude: Amplitude| Amplitude {
+        probability: amplitude.probability.min(most),
+        ..amplitude
+    };
     let found = fitted.unknowns.support_changes.iter().zip(&fitted.changes);
-    found.map(|(&change, &amplitude)| FoundSupportChange::new(change, amplitude, id)).collect()
+    found
+        .map(|(&change, &amplitude)| FoundSupportChange::new(change, limited(amplitude), id))
+        .collect()
 }
 
 impl Fitted {

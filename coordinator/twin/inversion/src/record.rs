@@ -152,12 +152,18 @@ impl Inversion {
         inversion
     }
 
-    /// Sentences on sleepers that the track model does not explain, on support changes, on sleepers that differ from
+    /// Sentences on a single speed, on sleepers that the track model does not explain, on support changes, on sleepers that differ from
     /// their neighbours, and on those whose railpad stiffness is a lower bound.
     pub fn sentences(&self) -> Vec<String> {
         let unexplained = self.with(Flag::OutsideLibrary);
         let apart = self.with(Flag::UnlikeNeighbours);
         let mut sentences = Vec::new();
+        if let [speed_km_h] = self.provenance.speeds_km_h[..] {
+            sentences.push(format!(
+                "One speed only ({speed_km_h:.0} km/h): stiffness and irregularity have similar effects, so that \
+                 estimates and support changes may be wrong. Add a pass at another speed."
+            ));
+        }
         if !unexplained.is_empty() {
             sentences.push(format!(
                 "The track model does not explain what was measured at {} of {} sleepers ({}): the \
@@ -203,4 +209,26 @@ pub(crate) fn log_normal(logarithm: f64, deviation: f64) -> Estimate {
     let variance = deviation * deviation;
     let mean = (logarithm + 0.5 * variance).exp();
     Estimate { mean, sd: mean * variance.exp_m1().sqrt() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_speed_is_a_doubt() {
+        let of = |speeds_km_h: &[f64]| {
+            let provenance = Provenance {
+                code_version: "1",
+                speeds_km_h: speeds_km_h.to_vec(),
+                passes: vec![1; speeds_km_h.len()],
+                prior: BTreeMap::new(),
+                variation: BTreeMap::new(),
+            };
+            Inversion::new("ride".to_owned(), provenance, Vec::new(), Vec::new(), Vec::new()).notes
+        };
+        assert_eq!(of(&[10.0, 13.0]), [""; 0]);
+        let doubt = of(&[13.0]);
+        assert!(doubt[0].starts_with("One speed only (13 km/h): stiffness and"), "{doubt:?}");
+    }
 }
