@@ -35,6 +35,7 @@ fn a_table_is_imported_and_inspected() {
     let arguments = [&["import", &file, "--out", &out][..], &columns].concat();
     let answer = run(PROGRAM, &arguments);
     assert_eq!(answer.code, Some(0), "{}", answer.err);
+    assert!(answer.out.contains("a sleeper spacing of 0.6 m is assumed"), "{}", answer.out);
 
     // The same again changes nothing.
     let answer = run(PROGRAM, &[&arguments[..], &["--json"]].concat()).succeeded();
@@ -51,6 +52,11 @@ fn a_table_is_imported_and_inspected() {
     let answer = run(PROGRAM, &["inspect", &out, "--json"]);
     let root: serde_json::Value = serde_json::from_str(&answer.out).unwrap();
     assert_eq!(root["sample_rate_Hz"], 2000.0);
+    for (index, command) in ["evaluate", "evaluate --models", "diagnose"].into_iter().enumerate() {
+        let sentence = root["uses"][index].as_str().unwrap();
+        let expected = format!("`{command}`: not possible: sleepers: their positions are unknown");
+        assert!(sentence.starts_with(&expected), "{sentence}");
+    }
 }
 
 #[test]

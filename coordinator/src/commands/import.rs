@@ -251,7 +251,7 @@ fn layout(arguments: &Arguments) -> Result<Layout, anyhow::Error> {
         });
     }
     layout.upwards |= arguments.upwards;
-    layout.spacing_m = arguments.spacing.unwrap_or(layout.spacing_m);
+    layout.spacing_m = arguments.spacing.or(layout.spacing_m);
     layout.sample_rate_hz = arguments.sample_rate.or(layout.sample_rate_hz);
     layout.speed_km_h = arguments.speed.or(layout.speed_km_h);
     layout.sleeper_m = arguments.sleeper.or(layout.sleeper_m);

@@ -1,15 +1,17 @@
 //! `tracktwin inspect`: content and quality of a recording.
 
+mod uses;
+
+use self::uses::uses;
 use super::files::{Force, check_file, write_file};
 use super::recording::RecordingArgument;
 use super::{OrInput, Stop, print_json, println_stdout};
 use clap::Args;
 use std::path::PathBuf;
 use tracktwin_files::Kind;
-use tracktwin_inspection::{Inspection, Place, inspect, separates_wavelengths};
+use tracktwin_inspection::{Inspection, Place, inspect};
 use tracktwin_number::{chance, rounded, significant};
 use tracktwin_report::{Inspected, InspectedCurve, InspectionReport, inspection_page};
-use tracktwin_signal::SAMPLES_A_PERIOD;
 use tracktwin_signal::recording::{Pass, Recording};
 use tracktwin_signal::{PowerSpectrum, Signal};
 
@@ -17,8 +19,6 @@ use tracktwin_signal::{PowerSpectrum, Signal};
 const LINES_HZ: f64 = 20.0;
 /// Number of points of a drawn curve.
 const POINTS: usize = 400;
-/// Sample rate required for features up to 4 kHz.
-const FEATURES_HZ: f64 = SAMPLES_A_PERIOD * 4000.0;
 
 /// Arguments of `inspect`.
 #[derive(Args)]
@@ -198,46 +198,6 @@ fn passes(recording: &Recording, inspection: &Inspection) -> Vec<Vec<String>> {
         ]);
     }
     rows
-}
-
-fn uses(recording: &Recording, inspection: &Inspection) -> Vec<String> {
-    let mut uses = Vec::new();
-    let rate = recording.sample_rate_hz;
-    if recording.sleepers.is_empty() {
-        uses.push(
-            "the positions of the sleepers are unknown, so `evaluate` and `diagnose` cannot \
-            use the recording; import it with --sleeper"
-                .to_owned(),
-        );
-    }
-    if rate < FEATURES_HZ {
-        uses.push(format!(
-            "the sample rate of {} Hz limits the analysis to {:.0} Hz; features up to 4000 Hz \
-             need {FEATURES_HZ:.0} Hz",
-            rounded(rate, 8),
-            rate / SAMPLES_A_PERIOD
-        ));
-    }
-    if !separates_wavelengths(&recording.passes) {
-        let fastest = recording.speeds_km_h().into_iter().fold(0.0, f64::max);
-        uses.push(format!(
-            "one speed only: effects of constant frequency (structure) and of constant wavelength \
-             (surface) cannot be separated, so corrugation and wheel orders are not tested; add a \
-             pass {:.0} km/h slower",
-            0.25 * fastest
-        ));
-    }
-    if inspection.offsets.is_empty() {
-        uses.push(
-            "no speed has two passes: repeatable signal and noise cannot be separated".to_owned(),
-        );
-    }
-    if uses.is_empty() && inspection.pass_defects.is_empty() && recording.doubts.is_empty() {
-        uses.push(
-            "suitable for `evaluate` and `diagnose`, with models of the same speeds".to_owned(),
-        );
-    }
-    uses
 }
 
 fn curves(recording: &Recording, points: impl Fn(&Pass) -> Vec<(f64, f64)>) -> Vec<InspectedCurve> {

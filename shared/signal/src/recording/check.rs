@@ -39,10 +39,10 @@ pub(super) fn times(
 /// Computes the expected step from the declared rate, unless this rate is wrong too.
 fn known_rate(fault: Fault, declared: f64) -> Fault {
     match fault {
-        Fault::UnevenTime { row, step, expected }
+        Fault::UnevenTime { row, step, expected, alternative }
             if (1.0 / declared / expected - 1.0).abs() < STEP_TOLERANCE =>
         {
-            Fault::UnevenTime { row, step, expected: 1.0 / declared }
+            Fault::UnevenTime { row, step, expected: 1.0 / declared, alternative }
         }
         other => other,
     }

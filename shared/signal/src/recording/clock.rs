@@ -107,7 +107,8 @@ fn uneven_step(times: &[f64], mean: f64) -> Option<Fault> {
     let expected = if (mean / median - 1.0).abs() < STEP_TOLERANCE { mean } else { median };
     let odd = |step: f64| !(step > 0.0 && (step - expected).abs() <= STEP_TOLERANCE * expected);
     let row = steps.iter().position(|&step| odd(step))?;
-    Some(Fault::UnevenTime { row: row + 2, step: steps.swap_remove(row), expected })
+    let step = steps.swap_remove(row);
+    Some(Fault::UnevenTime { row: row + 2, step, expected, alternative: "" })
 }
 
 #[cfg(test)]

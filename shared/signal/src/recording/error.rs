@@ -70,10 +70,10 @@ pub enum Fault {
         expected: &'static str,
     },
     /// A field that is needed is absent.
-    #[error("is missing; add {expected}")]
+    #[error("is missing; {remedy}")]
     NoField {
-        /// The expected value.
-        expected: String,
+        /// How to state it.
+        remedy: String,
     },
     /// A field holds another kind of value.
     #[error("is {found}; give {expected}")]
@@ -92,9 +92,9 @@ pub enum Fault {
         /// The name.
         id: String,
     },
-    /// A file instead of a folder.
-    #[error("is a file, but a recording is a folder; create one with `tracktwin import`")]
-    NoFolder,
+    /// The path of a recording is not a folder with `recording.json`.
+    #[error("{0}")]
+    NoFolder(&'static str),
     /// The columns of a CSV file are not separated by commas.
     #[error("the columns are not separated by commas; convert the file with `tracktwin import`")]
     Separator,
@@ -175,7 +175,9 @@ pub enum Fault {
         kind: String,
     },
     /// A value is not a finite number; rows count from 1, the first row of data.
-    #[error("row {row} is {value}; write a number there, or remove that stretch")]
+    #[error(
+        "row {row} is {value}; leave that row out, split the pass there into two files, and list both in recording.json or after `tracktwin import`"
+    )]
     NotFinite {
         /// The row, counted from 1.
         row: usize,
@@ -184,8 +186,7 @@ pub enum Fault {
     },
     /// A code for a missing value.
     #[error(
-        "row {row} is {value}, far from all other values: probably a code for a missing \
-             value; remove that stretch"
+        "row {row} is {value}, far from all other values: probably a code for a missing value; leave that row out, split the file there into two, and import both"
     )]
     Missing {
         /// The row, counted from 1.
@@ -243,8 +244,8 @@ pub enum Fault {
     },
     /// A step in time differs from the sample interval.
     #[error(
-        "the step to row {row} is {} s, but {} s is expected; remove repeated rows, split \
-             the pass at a gap, or omit the times and state the sample rate",
+        "the step to row {row} is {} s, but {} s is expected; remove repeated rows, or split \
+             the pass at a gap{alternative}",
         rounded(*step, 3),
         rounded(*expected, 3)
     )]
@@ -255,6 +256,8 @@ pub enum Fault {
         step: f64,
         /// The sample interval in s.
         expected: f64,
+        /// A further remedy.
+        alternative: &'static str,
     },
     /// The position decreases.
     #[error(

@@ -15,6 +15,12 @@ use std::path::{Path, PathBuf};
 use tracktwin_files::{FileName, FilesError, Kind, Names, Output, inside};
 use tracktwin_number::significant;
 
+/// What is wrong with a path that is not a recording.
+const FILE: &str = "is a file, but a recording is a folder; create one with `tracktwin import`";
+const NO_FOLDER: &str =
+    "the folder does not exist; correct its name, or create it with `tracktwin import`";
+const NO_MANIFEST: &str = "the folder holds no recording.json; create one with `tracktwin import`";
+
 /// Axle-box accelerations of one vehicle over one stretch of track, in several passes.
 #[derive(Clone, Debug)]
 pub struct Recording {
@@ -247,10 +253,19 @@ fn stated(
     folder: &Path,
     read: impl Fn(&Path) -> Result<Manifest, RecordingError>,
 ) -> Result<(PathBuf, Manifest, f64), RecordingError> {
-    if folder.is_file() {
-        return Err(RecordingError::new(folder, "recording", Fault::NoFolder));
-    }
     let path = folder.join(FILE_NAME);
+    let fault = if folder.is_file() {
+        Some(FILE)
+    } else if !folder.exists() {
+        Some(NO_FOLDER)
+    } else if !path.exists() {
+        Some(NO_MANIFEST)
+    } else {
+        None
+    };
+    if let Some(fault) = fault {
+        return Err(RecordingError::new(folder, "recording", Fault::NoFolder(fault)));
+    }
     let manifest = read(&path)?;
     limits::manifest(&path, &manifest)?;
     let spacing_m = spacing(&path, &manifest)?;
@@ -326,7 +341,7 @@ fn spacing(path: &Path, manifest: &Manifest) -> Result<f64, RecordingError> {
         });
     }
     median_distance_m(&manifest.sleepers).filter(|&spacing| spacing > 0.0).ok_or_else(|| {
-        RecordingError::new(path, FIELD, Fault::NoField { expected: expected.to_owned() })
+        RecordingError::new(path, FIELD, Fault::NoField { remedy: format!("add {expected}") })
     })
 }
 

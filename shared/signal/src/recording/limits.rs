@@ -32,8 +32,8 @@ const NOMINAL: [(&str, &str, Quantity); 11] = [
         Quantity::new("half length of a sleeper", "m", [0.02, 5.0], [0.2, 1.4]),
     ),
     ("sleeper", "density_kg_m3", Quantity::new("density", "kg/m3", [100.0, 5e4], [700.0, 8000.0])),
-    ("wheel", "mass_kg", Quantity::new("mass of a wheel", "kg", [0.1, 1e5], [10.0, 2000.0])),
-    ("wheel", "load_N", Quantity::new("wheel load", "N", [1.0, 1e7], [500.0, 2e5])),
+    ("wheel", "mass_kg", Quantity::new("mass of a wheel", "kg", [4.0, 1e4], [10.0, 2000.0])),
+    ("wheel", "load_N", Quantity::new("wheel load", "N", [4e2, 1e6], [500.0, 2e5])),
     ("wheel", "radius_m", WHEEL_RADIUS),
 ];
 
@@ -101,6 +101,7 @@ fn unpacked(path: &Path) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tracktwin_parameters::DesignNumber;
 
     #[test]
     fn a_file_that_no_memory_holds_is_refused_before_it_is_read() {
@@ -112,6 +113,18 @@ mod tests {
         assert!(error.contains("pass.csv: file: has 3.0 GB") && error.contains("split"), "{error}");
         File::create(&path).unwrap().set_len(100).unwrap();
         file(&path).unwrap();
+    }
+
+    #[test]
+    fn mass_and_load_have_the_limits_of_a_track_file() {
+        for (name, key) in [("mass_kg", "vehicle.mass_kg"), ("load_N", "vehicle.load_N")] {
+            let stated = NOMINAL.iter().find(|it| it.1 == name).map(|it| it.2.range);
+            assert_eq!(stated, DesignNumber::named(key).map(DesignNumber::range), "{key}");
+        }
+        // Kilonewtons.
+        let load = NOMINAL.iter().find(|it| it.1 == "load_N").unwrap().2;
+        let error = load.check(60.0).unwrap_err().to_string();
+        assert!(error.contains("did you mean 60000?"), "{error}");
     }
 
     #[test]

@@ -156,7 +156,7 @@ impl<'a> Fields<'a> {
 
     fn needed(&self, name: &str, expected: &'static str) -> Result<&'a Value, RecordingError> {
         self.get(name)
-            .ok_or_else(|| self.fault(name, Fault::NoField { expected: expected.to_owned() }))
+            .ok_or_else(|| self.fault(name, Fault::NoField { remedy: format!("add {expected}") }))
     }
 
     fn wrong(&self, name: &str, found: &Value, expected: &'static str) -> RecordingError {

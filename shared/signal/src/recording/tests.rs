@@ -155,9 +155,17 @@ fn csv_passes_are_read() {
 #[test]
 fn a_missing_or_broken_manifest_is_named() {
     let empty = tempfile::tempdir().unwrap();
-    assert_eq!(
-        complaint(empty.path()),
-        "recording.json: file: the file does not exist; add it or correct its name"
+    let text = complaint(empty.path());
+    assert!(
+        text.ends_with(
+            ": recording: the folder holds no recording.json; create one with `tracktwin import`"
+        ),
+        "{text}"
+    );
+    let text = complaint(&empty.path().join("gone"));
+    assert!(
+        text.contains("gone: recording: the folder does not exist; correct its name"),
+        "{text}"
     );
     fs::write(empty.path().join("recording.json"), "{\"format\": ").unwrap();
     let text = complaint(empty.path());

@@ -11,7 +11,7 @@ use tracktwin_parameters::quantity::{PLACE, SAMPLE_RATE, SPACING, SPEED, WHEEL_R
 /// `speed`, otherwise from the constant speed `speed_km_h`. The sample rate comes from `sample_rate_hz`,
 /// otherwise from `time`. Values given twice must agree. Units that are not given come from the file or
 /// the column names, otherwise they are m/s2, s, m and km/h.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Layout {
     /// Columns of vertical axle-box acceleration; each becomes a recording.
@@ -37,8 +37,8 @@ pub struct Layout {
     pub sample_rate_hz: Option<f64>,
     /// Speed of all passes in km/h.
     pub speed_km_h: Option<f64>,
-    /// Sleeper spacing in m.
-    pub spacing_m: f64,
+    /// Sleeper spacing in m. `None`: the usual one of main lines is assumed ([`Layout::spacing_m`]).
+    pub spacing_m: Option<f64>,
     /// Position of one sleeper in m. `None`: unknown; the recording then has no sleepers.
     pub sleeper_m: Option<f64>,
     /// Radius of the wheel in m, if known.
@@ -55,7 +55,22 @@ pub struct LayoutError {
     pub source: QuantityError,
 }
 
+/// Sleeper spacing in m that is assumed: the commonest in main lines.
+const SPACING_M: f64 = 0.6;
+
 impl Layout {
+    /// The stated sleeper spacing in m, or the assumed one.
+    pub fn spacing_m(&self) -> f64 {
+        self.spacing_m.unwrap_or(SPACING_M)
+    }
+
+    /// Note on an assumed sleeper spacing.
+    pub(super) fn assumed(&self) -> Option<String> {
+        let note =
+            format!("a sleeper spacing of {SPACING_M} m is assumed; state it with --spacing");
+        self.spacing_m.is_none().then_some(note)
+    }
+
     /// Checks that every number is within its limits.
     ///
     /// # Errors
@@ -64,7 +79,7 @@ impl Layout {
         let given = [
             ("sample_rate_Hz", self.sample_rate_hz, SAMPLE_RATE),
             ("speed_km_h", self.speed_km_h, SPEED),
-            ("spacing_m", Some(self.spacing_m), SPACING),
+            ("spacing_m", self.spacing_m, SPACING),
             ("sleeper_m", self.sleeper_m, PLACE),
             ("wheel_radius_m", self.wheel_radius_m, WHEEL_RADIUS),
         ];
@@ -75,27 +90,5 @@ impl Layout {
                 .map_err(|source| LayoutError { entry, source })?;
         }
         Ok(())
-    }
-}
-
-impl Default for Layout {
-    fn default() -> Self {
-        Self {
-            acceleration: Vec::new(),
-            time: None,
-            position: None,
-            speed: None,
-            acceleration_unit: None,
-            time_unit: None,
-            position_unit: None,
-            speed_unit: None,
-            upwards: false,
-            sample_rate_hz: None,
-            speed_km_h: None,
-            // The commonest in main lines.
-            spacing_m: 0.6,
-            sleeper_m: None,
-            wheel_radius_m: None,
-        }
     }
 }

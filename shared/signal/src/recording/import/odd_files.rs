@@ -209,7 +209,8 @@ fn coarse_clocks_are_straightened_and_gaps_refused() {
     assert!(notes.contains("advances in steps of 10 ms"), "{notes}");
     let late = |row: usize| if row < 500 { 0.0 } else { 0.5 };
     let path = changed(folder.path(), |row, [t, x, acc]| [t + late(row), x, acc]);
-    assert!(complaint(&path, &layout()).contains("to row 501"));
+    let text = complaint(&path, &layout());
+    assert!(text.contains("to row 501") && text.contains("or state `--sample-rate HZ`"), "{text}");
 }
 
 #[test]

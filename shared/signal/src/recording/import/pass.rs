@@ -29,14 +29,12 @@ pub fn import(files: &[PathBuf], layout: &Layout) -> Result<Vec<Imported>, Recor
     let tables: Vec<Table> =
         files.iter().map(|file| Table::read(file)).collect::<Result<_, _>>()?;
     let first = files.first().map_or(Path::new("files"), PathBuf::as_path);
-    let missing = |field: &str, expected: &str| {
-        let fault = Fault::NoField { expected: expected.to_owned() };
-        RecordingError::new(first, field, fault)
-    };
     if layout.acceleration.is_empty() {
         let names = tables.first().map(names).unwrap_or_default();
-        let expected = format!("the acceleration column (the columns of the file are {names})");
-        return Err(missing("acceleration", &expected));
+        let remedy = format!(
+            "state it with `--column acceleration=NAME` (the columns of the file are {names})"
+        );
+        return Err(RecordingError::new(first, "acceleration", Fault::NoField { remedy }));
     }
     layout.check().map_err(|error| {
         RecordingError::new(first, error.entry, Fault::OutOfRange(error.source))
@@ -73,8 +71,9 @@ fn recording(tables: &[Table], column: &str, layout: &Layout) -> Result<Imported
         .collect::<Result<_, _>>()?;
     let known = layout.sleeper_m.map(|x_m| if is_backwards { -x_m } else { x_m });
     let sleepers = known
-        .map_or_else(|| Ok(Vec::new()), |x_m| sleepers(&passes, layout.spacing_m, x_m))
+        .map_or_else(|| Ok(Vec::new()), |x_m| sleepers(&passes, layout.spacing_m(), x_m))
         .map_err(|error| RecordingError::new(&first, "spacing_m", Fault::OutOfRange(error)))?;
+    notes.extend(layout.assumed());
     if sleepers.is_empty() {
         notes.push("no sleeper position is known: the recording has no sleepers".to_owned());
     }
@@ -91,7 +90,7 @@ fn recording(tables: &[Table], column: &str, layout: &Layout) -> Result<Imported
         passes,
         sleepers,
         nominal: nominal(layout, is_gain_known),
-        spacing_m: layout.spacing_m,
+        spacing_m: layout.spacing_m(),
         doubts: Vec::new(),
     };
     Ok(Imported { column: column.to_owned(), recording, notes })
@@ -122,7 +121,7 @@ fn is_backwards(raw: &[Raw]) -> Result<bool, RecordingError> {
 
 fn nominal(layout: &Layout, is_gain_known: bool) -> Map<String, serde_json::Value> {
     let mut nominal = Map::new();
-    nominal.insert("sleeper".to_owned(), json!({"spacing_m": layout.spacing_m}));
+    nominal.insert("sleeper".to_owned(), json!({"spacing_m": layout.spacing_m()}));
     if let Some(radius) = layout.wheel_radius_m {
         nominal.insert("wheel".to_owned(), json!({"radius_m": radius}));
     }

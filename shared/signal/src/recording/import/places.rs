@@ -56,8 +56,9 @@ impl Places {
             let position_m = (0..count).map(place).collect();
             Self { name: "speed_km_h", position_m, unit: ("km/h", true), other_km_h: None }
         } else {
-            let expected = "a speed in km/h, or a position or speed column".to_owned();
-            let fault = Fault::NoField { expected };
+            let remedy =
+                "state `--speed KMH`, `--column position=NAME` or `--column speed=NAME`".to_owned();
+            let fault = Fault::NoField { remedy };
             return Err(RecordingError::new(&table.path, "speed_km_h", fault));
         };
         if places.position_m.len() != count {

@@ -24,7 +24,8 @@ pub(super) fn of(
 ) -> Result<f64, RecordingError> {
     match (&layout.time, layout.sample_rate_hz) {
         (None, None) => {
-            let fault = Fault::NoField { expected: "it, or a time column".to_owned() };
+            let remedy = "state `--sample-rate HZ` or `--column time=NAME`".to_owned();
+            let fault = Fault::NoField { remedy };
             Err(RecordingError::new(&table.path, "sample_rate_Hz", fault))
         }
         (None, Some(stated)) => {
@@ -56,7 +57,7 @@ fn clock(
     let column = table.column(name)?;
     let fault = |fault| RecordingError::new(&table.path, name, fault);
     let unit = of_column(column, told, notes).map_err(fault)?;
-    let clock = in_unit(column, unit).map_err(fault)?;
+    let clock = in_unit(column, unit).map_err(|uneven| fault(or_omit(uneven)))?;
     let observed = clock.rate_hz;
     let is_sure = told.is_some() || column.unit.is_some();
     if !is_sure && !(PLAUSIBLE_HZ[0]..=PLAUSIBLE_HZ[1]).contains(&observed) {
@@ -87,6 +88,17 @@ fn in_unit(column: &Column, unit: TimeUnit) -> Result<SampleClock, Fault> {
     // From the first on: a time since 1970 leaves no digits for the steps.
     let times: Vec<f64> = column.values.iter().map(|time| unit.in_si() * (time - begin)).collect();
     SampleClock::of(&times)
+}
+
+/// The fault of uneven times with the remedy that only an import has.
+fn or_omit(fault: Fault) -> Fault {
+    match fault {
+        Fault::UnevenTime { row, step, expected, .. } => {
+            let alternative = ", or state `--sample-rate HZ` instead of the time column";
+            Fault::UnevenTime { row, step, expected, alternative }
+        }
+        other => other,
+    }
 }
 
 /// The unit in which the times would be plausible; `per_unit` is the number of samples per unit.

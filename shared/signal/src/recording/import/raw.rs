@@ -74,14 +74,14 @@ impl Raw {
         let position_m = std::mem::take(&mut self.places.position_m);
         let odometer = Odometer::straightened(position_m, self.rate_hz).map_err(fault)?;
         if layout.sleeper_m.is_some() {
-            odometer.tells_sleepers(layout.spacing_m).map_err(fault)?;
+            odometer.tells_sleepers(layout.spacing_m()).map_err(fault)?;
         }
         let Odometer { position_m, step_m } = odometer;
         notes.extend(step_m.map(|step_m| straightened(&file, step_m)));
         let last = position_m.len() - 1;
         let speed_km_h = 3.6 * (position_m[last] - position_m[0]) * self.rate_hz / last as f64;
         self.places.check_speed(speed_km_h, layout).map_err(fault)?;
-        check::length(&self.path, &position_m, layout.spacing_m)?;
+        check::length(&self.path, &position_m, layout.spacing_m())?;
         let mean = self.samples.iter().sum::<f64>() / self.samples.len() as f64;
         // Gravity and the amplifier's offset; nothing of the track is that slow.
         let samples: Vec<f64> = self.samples.iter().map(|value| value - mean).collect();

@@ -188,7 +188,7 @@ fn units_signs_and_places_come_out_in_si() {
     let places_in = |unit| Layout {
         position: Some("t".to_owned()),
         position_unit: Some(unit),
-        spacing_m: 0.05,
+        spacing_m: Some(0.05),
         ..layout()
     };
     // 10 m/s in millimetres.
@@ -221,12 +221,15 @@ fn a_layout_that_does_not_suffice_says_what_is_missing() {
     let text = complaint(&path, &Layout { acceleration: Vec::new(), ..layout() });
     assert_eq!(
         text,
-        "pass.csv: acceleration: is missing; add the acceleration column (the columns of the file are t, acc)"
+        "pass.csv: acceleration: is missing; state it with `--column acceleration=NAME` (the columns of the file are t, acc)"
     );
     let text = complaint(&path, &Layout { sample_rate_hz: None, ..layout() });
-    assert_eq!(text, "pass.csv: sample_rate_Hz: is missing; add it, or a time column");
+    assert_eq!(
+        text,
+        "pass.csv: sample_rate_Hz: is missing; state `--sample-rate HZ` or `--column time=NAME`"
+    );
     let text = complaint(&path, &Layout { speed_km_h: None, ..layout() });
-    assert!(text.starts_with("pass.csv: speed_km_h: is missing; add a speed in km/h"), "{text}");
+    assert!(text.starts_with("pass.csv: speed_km_h: is missing; state `--speed KMH`, "), "{text}");
     let text = complaint(&path, &Layout { acceleration: vec!["left".to_owned()], ..layout() });
     assert!(
         text.contains("the column is missing; rename one of the file's columns: t, acc"),
@@ -240,7 +243,7 @@ fn what_is_no_number_is_named_by_its_row() {
     let path = folder.path().join("pass.csv");
     fs::write(&path, "t,acc,remark\n0,1,start\n1,n/a,\n2,3,end\n").unwrap();
     let text = complaint(&path, &layout());
-    assert!(text.starts_with("pass.csv: acc: row 2 is \"n/a\"; write a number"), "{text}");
+    assert!(text.starts_with("pass.csv: acc: row 2 is \"n/a\"; leave that row out"), "{text}");
     fs::write(folder.path().join("pass.odd"), "").unwrap();
     let text = complaint(&folder.path().join("pass.odd"), &layout());
     assert!(text.starts_with("pass.odd: file: the extension is not one of .csv"), "{text}");
