@@ -98,6 +98,8 @@ fn numbers_that_no_track_or_machine_has_are_refused_with_what_can_be() {
         (&["simulate", "--speed=0.0001"][..], &["0.5 to 500 km/h"][..]),
         (&["simulate", "--speed=0.5", "--spans=1000"], &["samples", "GB", "--time-step"]),
         (&["simulate", "--spans=1000000000"], &["2 to 1000"]),
+        (&["simulate", "--speed=10", "--speed=13", "--speed=10"], &["--speed 10", "--passes 2"]),
+        (&["simulate", "--speed=200", "--sample-rate=1000"], &["--sample-rate", "filter"]),
         (&["simulate", "--passes=1000000000"], &["1 to 1000"]),
         (&["simulate", "--passes=1000", "--speed=1"], &["samples", "GB"]),
         (&["simulate", "--rail-elements=1000000"], &["1 to 64"]),
@@ -107,6 +109,14 @@ fn numbers_that_no_track_or_machine_has_are_refused_with_what_can_be() {
         (&["simulate", "--set=ballast_stiffness_N_m=1e30"], &["N/m", "can be"]),
         (&["simulate", "--extend=wheel_flat:length_m=1e9"], &["length_m", "can be"]),
         (&["simulate", "--extend=second_wheel:distance_m=1e9"], &["distance_m", "can be"]),
+        (
+            &["receptance", "--at=sleeper", "--set=ballast_stiffness_N_m@SN3=1e7"],
+            &["remove the sleepers"],
+        ),
+        (
+            &["hammer", "simulate", "--set=ballast_stiffness_N_m@SN12=1e7"],
+            &["SN12 does not exist; the last sleeper is SN11"],
+        ),
         (&["import", "f.csv", "--spacing=1e-6"], &["0.05 to 2 m"]),
         (&["import", "f.csv", "--spacing=600"], &["600 m is not a valid", "did you mean 0.6?"]),
         (&["import", "f.csv", "--speed=9999"], &["0.5 to 500 km/h"]),

@@ -3,7 +3,7 @@
 use super::evaluate::{Method, stop};
 use super::library_url::open_or_create;
 use super::progress::Progress;
-use super::simulate::Setting;
+use super::simulate::{Setting, check_whole_track};
 use super::{OrInput, Stop, print_json, println_stdout};
 use crate::pipeline::compute::compute;
 use crate::pipeline::coverage::{Counts, Coverage, CoverageRow, Kind, inversion_rows};
@@ -42,7 +42,7 @@ pub(super) struct Arguments {
     #[arg(long, value_enum, default_value_t = Method::Gp)]
     method: Method,
     /// Folder of trained models, written by `train` or `run`; required with `--method gp`.
-    #[arg(long, value_name = "DIR", requires = "library", required_if_eq("method", "gp"))]
+    #[arg(long, value_name = "DIR", requires = "library")]
     models: Option<PathBuf>,
     /// Library of the models; with `--method inversion` it stores null simulations and is created
     /// if missing.
@@ -89,11 +89,10 @@ impl From<Recorder> for Making {
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let settings = settings(&arguments.settings)?;
-    let (Method::Gp, Some(models), Some(library)) =
-        (arguments.method, &arguments.models, &arguments.library)
-    else {
+    if arguments.method == Method::Inversion {
         return by_inversion(&arguments).await;
-    };
+    }
+    let (models, library) = models_and_library(&arguments)?;
     let models = Trained::load(models).or_input()?;
     let library = Library::open(library).await?;
     let evaluator = Evaluator::new(models, &library).await.map_err(stop)?;
@@ -109,6 +108,18 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let even =
         rows.iter().find(|row| matches!(row.kind, Kind::Inside { scatter } if scatter <= 0.0));
     if even.is_some_and(|row| row.any_outside > FALSE_MOST) { Err(Stop::Negative) } else { Ok(()) }
+}
+
+/// The folder of the models and the URL of their library, which the method `gp` needs.
+fn models_and_library(arguments: &Arguments) -> Result<(&PathBuf, &str), Stop> {
+    match (&arguments.models, &arguments.library) {
+        (Some(models), Some(library)) => Ok((models, library)),
+        _ => Err(anyhow!(
+            "--models: required with --method gp, which is the default, as is the --library of the models; without \
+             models use --method inversion"
+        ))
+        .or_input(),
+    }
 }
 
 /// Table of the inversion on uneven tracks.
@@ -149,11 +160,8 @@ async fn by_inversion(arguments: &Arguments) -> Result<(), Stop> {
 }
 
 fn settings(given: &[Setting]) -> Result<Vec<(Parameter, f64)>, Stop> {
-    let setting = |setting: &Setting| match setting.sleepers {
-        None => Ok((setting.parameter, setting.value)),
-        Some(_) => Err(anyhow!("--set: the value applies to the whole track; remove the sleepers")),
-    };
-    given.iter().map(setting).collect::<Result<_, _>>().or_input()
+    check_whole_track(given).or_input()?;
+    Ok(given.iter().map(|setting| (setting.parameter, setting.value)).collect())
 }
 
 fn rows(
@@ -243,5 +251,34 @@ fn name(kind: Kind) -> String {
         Kind::Beyond { parameter, side: Side::Low } => format!("{parameter} 30 % below"),
         Kind::Beyond { parameter, side: Side::High } => format!("{parameter} 30 % above"),
         Kind::Set { parameter, value } => format!("{parameter} = {value:e}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        arguments: Arguments,
+    }
+
+    #[test]
+    fn the_default_method_requires_models() {
+        let arguments = |given: &[&str]| {
+            Line::try_parse_from([&["coverage", "--library", "sqlite:x"][..], given].concat())
+                .unwrap()
+                .arguments
+        };
+        for given in [&[][..], &["--method", "gp"]] {
+            let arguments = arguments(given);
+            let refused = models_and_library(&arguments);
+            let Err(Stop::Input(error)) = refused else { panic!("{refused:?}") };
+            assert!(error.to_string().starts_with("--models: required"), "{error}");
+        }
+        let with_models = arguments(&["--models", "m"]);
+        assert!(models_and_library(&with_models).is_ok_and(|(_, library)| library == "sqlite:x"));
     }
 }

@@ -5,15 +5,14 @@ use super::library_url::{open_or_create, open_whole};
 use super::progress::SectionStages;
 use super::recording::RecordingArgument;
 use super::track::TrackOption;
-use super::{OrInput, Stop, print_json, println_stderr, println_stdout};
+use super::{OrInput, Stop, evaluate, print_json, println_stderr, println_stdout};
 use crate::pipeline;
 use crate::pipeline::diagnose::Setting;
 use crate::pipeline::diagnose_sections::{
     At, DIAGNOSIS, PAGE, SectionOutput, SectionsError, add_to, diagnose_sections,
 };
-use crate::pipeline::evaluate::design_for;
+use crate::pipeline::evaluate::{design_for, no_campaign};
 use crate::pipeline::provenance;
-use anyhow::Context;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use serde_json::{Value, json};
@@ -249,13 +248,8 @@ async fn of_models(
         return Ok(None);
     };
     let models = Trained::load(&models).or_input()?;
-    let campaign = library
-        .campaign(models.campaign())
-        .await
-        .context(
-            "the models belong to another library; give their library, or train models on this one",
-        )
-        .or_input()?;
+    let campaign = library.campaign(models.campaign()).await.map_err(no_campaign);
+    let campaign = campaign.map_err(evaluate::stop)?;
     let experiment = pipeline::train::experiment(&campaign).or_input()?;
     Ok(Some(Track::of(design_for(&experiment, recording))))
 }

@@ -2,6 +2,7 @@
 
 use super::files::{Force, check, is_stream, write_file};
 use super::numbers::{count, number};
+use super::simulate::{Setting, check_whole_track};
 use super::track::TrackChoice;
 use super::{OrInput, Stop, println_stdout};
 use anyhow::anyhow;
@@ -49,7 +50,7 @@ pub(super) struct Arguments {
     points: usize,
     /// Value of a parameter, e.g. `railpad_stiffness_N_m=9e7`; may be repeated.
     #[arg(long = "set", value_name = "NAME=VALUE")]
-    settings: Vec<super::simulate::Setting>,
+    settings: Vec<Setting>,
     #[command(flatten)]
     track: TrackChoice,
 }
@@ -97,6 +98,7 @@ fn test_point(text: &str) -> Result<TestPoint, String> {
 pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     check_files(arguments)?;
     let frequencies = frequencies(arguments).or_input()?;
+    check_whole_track(&arguments.settings).or_input()?;
     let track = arguments.track.track()?;
     let set = arguments.settings.iter().fold(track.nominal, |set, setting| setting.apply(set, 0));
     let model = model(arguments.spans, &track, &set)?;

@@ -4,7 +4,7 @@ use super::files::{Force, make_folder};
 use super::library_url::open_or_create;
 use super::progress::Progress;
 use super::track::parser_of;
-use super::{OrInput, Stop, print_json, println_stderr, println_stdout};
+use super::{OrInput, Stop, evaluate, print_json, println_stderr, println_stdout};
 use crate::pipeline::evaluate::Evaluator;
 use crate::pipeline::trial::{Trial, TrialError, check_folder};
 use anyhow::anyhow;
@@ -137,7 +137,7 @@ async fn paper(
     library: &Library,
 ) -> Result<Option<Evaluator>, Stop> {
     let Some(models) = models else { return Ok(None) };
-    let evaluator = Evaluator::new(models, library).await.or_input()?;
+    let evaluator = Evaluator::new(models, library).await.map_err(evaluate::stop)?;
     check_models(&evaluator, preset).or_input()?;
     Ok(Some(evaluator))
 }

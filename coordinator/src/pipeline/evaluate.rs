@@ -50,8 +50,7 @@ impl Evaluator {
     /// Returns [`EvaluatorError`] if the models do not belong to the library, or the library cannot be
     /// read.
     pub async fn new(models: Trained, library: &Library) -> Result<Self, EvaluatorError> {
-        let campaign =
-            library.campaign(models.campaign()).await.map_err(EvaluatorError::Foreign)?;
+        let campaign = library.campaign(models.campaign()).await.map_err(no_campaign)?;
         let used_hz = models.frequencies_hz();
         let set = pipeline::train::set(library, &campaign, used_hz.last().copied()).await?;
         let experiment = pipeline::train::experiment(&campaign)?;
@@ -144,5 +143,26 @@ impl std::fmt::Debug for Evaluator {
         f.debug_struct("Evaluator")
             .field("campaign", &self.models.campaign())
             .finish_non_exhaustive()
+    }
+}
+
+/// The error for a campaign that cannot be read: the models are of another library only if the campaign is unknown.
+pub(crate) fn no_campaign(error: LibraryError) -> EvaluatorError {
+    match error {
+        LibraryError::UnknownCampaign { .. } => EvaluatorError::Foreign(error),
+        unread => EvaluatorError::Library(TrainingError::Library(unread)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_library_that_is_away_is_not_another_library() {
+        let away = no_campaign(LibraryError::Unavailable { reason: "no response".to_owned() });
+        assert!(matches!(away, EvaluatorError::Library(_)), "{away}");
+        let unknown = no_campaign(LibraryError::UnknownCampaign { id: "c".to_owned() });
+        assert!(matches!(unknown, EvaluatorError::Foreign(_)), "{unknown}");
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::commands::files::{Force, check, is_stream, write_file};
 use crate::commands::numbers::{count, number};
-use crate::commands::simulate::Setting;
+use crate::commands::simulate::{Setting, check_sleepers};
 use crate::commands::track::TrackChoice;
 use crate::commands::{OrInput, Stop, println_stdout};
 use anyhow::anyhow;
@@ -72,6 +72,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     if let Some((folder, names)) = &names {
         check(folder, Kind::Curves, *force, &[names[0].as_str(), names[1].as_str()])?;
     }
+    check_sleepers(&arguments.settings, arguments.sleepers).or_input()?;
     let track = arguments.track.track()?;
     let test = hammer_test(arguments, &track);
     let points = test.receptances(&track.design).or_input()?;

@@ -160,15 +160,42 @@ impl Compared {
     }
 }
 
-/// Compares each campaign in both libraries.
-async fn compare(from: &Library, to: &Library) -> Result<Vec<Compared>, Stop> {
+/// Compares each campaign in both libraries. If the source's list of campaigns is damaged, those of the copy are
+/// compared that the source has too.
+async fn compare(from: &Library, to: &Library) -> Result<Vec<Compared>, LibraryError> {
+    let campaigns = match from.campaigns().await {
+        Err(error) if error.is_of_the_data() => to.campaigns().await?,
+        read => read?,
+    };
     let mut compared = Vec::new();
-    for campaign in from.campaigns().await.unwrap_or_default() {
+    for campaign in campaigns {
+        let of_source = match from.digest(&campaign.id).await {
+            Err(LibraryError::UnknownCampaign { .. }) => continue,
+            Err(error) if error.is_of_the_data() => Err(error.to_string()),
+            read => Ok(read?),
+        };
         compared.push(Compared {
             to: to.digest(&campaign.id).await?,
-            from: from.digest(&campaign.id).await.map_err(|error| error.to_string()),
+            from: of_source,
             campaign: campaign.id,
         });
     }
     Ok(compared)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn a_source_that_is_away_is_not_a_source_without_campaigns() {
+        let folder = tempfile::tempdir().unwrap();
+        let url = |name: &str| format!("sqlite:{}", folder.path().join(name).display());
+        let from = Library::open_or_create(&url("from.sqlite")).await.unwrap();
+        let to = Library::open_or_create(&url("to.sqlite")).await.unwrap();
+        assert!(compare(&from, &to).await.unwrap().is_empty());
+        from.clone().close().await;
+        let error = compare(&from, &to).await.err();
+        assert!(matches!(error, Some(LibraryError::Closed)), "{error:?}");
+    }
 }

@@ -18,7 +18,7 @@ use clap::Args;
 pub(super) use extensions::Extensions;
 use sensor::Sensor;
 use serde_json::{Value, json};
-pub(super) use setting::Setting;
+pub(super) use setting::{Setting, check_sleepers, check_whole_track};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use track::SimulatedTrack;
@@ -106,6 +106,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     let Some(out) = &arguments.out else {
         return Err(anyhow!("--out: the folder of the recording is missing")).or_input();
     };
+    check_speeds(arguments).or_input()?;
     check(out, Kind::SimulatedRecording, arguments.force, &["recording.json", TRUTH])?;
     let track = SimulatedTrack::new(arguments)?;
     let drives = drives(arguments, &track);
@@ -170,6 +171,20 @@ fn contact_sentence(passes: &[Pass]) -> String {
             percent(share(&worst)),
             worst.speed_km_h
         ),
+    }
+}
+
+/// Checks that no speed is given twice: its passes would have the same seeds and be copies of each other.
+fn check_speeds(arguments: &Arguments) -> Result<(), anyhow::Error> {
+    let given = &arguments.speeds_km_h;
+    let count = |speed: &f64| given.iter().filter(|other| *other == speed).count() as u32;
+    match given.iter().find(|speed| count(speed) > 1) {
+        None => Ok(()),
+        Some(speed) => Err(anyhow!(
+            "--speed {speed}: given {} times; give it once, with --passes {} for as many passes at each speed",
+            count(speed),
+            count(speed) * arguments.passes
+        )),
     }
 }
 

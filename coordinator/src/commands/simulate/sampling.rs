@@ -15,7 +15,7 @@ pub(super) fn sample_rate_hz(time_step_s: f64) -> f64 {
 }
 
 /// Filtered accelerations in m/s2 and positions in m at the samples of a recorder, from time step `first` on. The last
-/// samples, whose filter would need later time steps, are left out.
+/// samples, whose filter would need later time steps, are left out; of a short pass no sample is left.
 ///
 /// The filter is a sinc with Blackman's window and has no delay. It passes what lies below 0.4 of the sample rate and
 /// stops what lies above a half.
@@ -24,7 +24,7 @@ pub(super) fn resampled(measured: &Measured, first: usize, sample_rate_hz: f64) 
     let steps = 1.0 / (sample_rate_hz * time_step_s);
     let reach = REACH * steps;
     let last = acceleration_m_s2.len() as f64 - 1.0 - reach;
-    let count = ((last - first as f64) / steps).floor().max(-1.0) as usize + 1;
+    let count = (((last - first as f64) / steps).floor() + 1.0).max(0.0) as usize;
     let places = (0..count).map(|sample| first as f64 + sample as f64 * steps);
     let filtered = |place: f64| {
         let taps = (place - reach).ceil().max(0.0) as usize..=(place + reach) as usize;
@@ -82,5 +82,17 @@ mod tests {
             let [aliased, _] = heard(0.52 * sample_rate_hz);
             assert!(aliased.iter().all(|sample| sample.abs() < 2e-3));
         }
+    }
+
+    #[test]
+    fn a_pass_that_is_shorter_than_the_filter_has_no_samples() {
+        let measured = Measured {
+            time_step_s: 1e-5,
+            acceleration_m_s2: vec![0.0; 3000],
+            position_m: vec![0.0; 3000],
+        };
+        assert!(resampled(&measured, 0, 1000.0).iter().all(Vec::is_empty));
+        assert!(resampled(&measured, 3000, 50_000.0).iter().all(Vec::is_empty));
+        assert_eq!(resampled(&measured, 0, 2000.0)[0].len(), 20);
     }
 }

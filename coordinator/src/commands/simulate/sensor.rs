@@ -1,7 +1,7 @@
 //! The measuring chain of a simulated recording: extensions, sample rate, noise, resolution, odometer.
 
-use super::super::Stop;
 use super::super::numbers::number;
+use super::super::{OrInput, Stop};
 use super::sampling::{resampled, sample_rate_hz};
 use anyhow::anyhow;
 use clap::Args;
@@ -81,6 +81,13 @@ impl Sensor {
             None => [measured.acceleration_m_s2, measured.position_m]
                 .map(|mut all| all.split_off(first)),
         };
+        if samples.is_empty() {
+            return Err(anyhow!(
+                "--sample-rate {sample_rate_hz}: the pass at {speed_km_h} km/h is shorter than the recorder's \
+                 filter; use a higher --sample-rate, a lower --speed or more --spans"
+            ))
+            .or_input();
+        }
         self.add_noise(&mut samples, &mut random)?;
         self.wander(&mut position_m, model.design().sleeper.spacing_m, &mut random);
         let signal = Signal::new(sample_rate_hz, samples)?;

@@ -1,5 +1,6 @@
 //! `NAME[@SLEEPERS]=VALUE`: value of a parameter at all sleepers or some.
 
+use anyhow::anyhow;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 use tracktwin_parameters::{Parameter, ParameterSet, QuantityError};
@@ -66,9 +67,45 @@ impl Setting {
     }
 }
 
+/// Checks that the sleepers of all settings exist on a track with `count` sleepers.
+pub(in crate::commands) fn check_sleepers(
+    settings: &[Setting],
+    count: usize,
+) -> Result<(), anyhow::Error> {
+    let ends = settings.iter().filter_map(|setting| Some(*setting.sleepers.as_ref()?.end()));
+    match ends.max().filter(|&last| last >= count) {
+        None => Ok(()),
+        Some(last) => {
+            Err(anyhow!("--set: SN{last} does not exist; the last sleeper is SN{}", count - 1))
+        }
+    }
+}
+
+/// Checks that no setting names sleepers, for commands whose track has the same parameters everywhere.
+pub(in crate::commands) fn check_whole_track(settings: &[Setting]) -> Result<(), anyhow::Error> {
+    if settings.iter().any(|setting| setting.sleepers.is_some()) {
+        return Err(anyhow!("--set: the value applies to the whole track; remove the sleepers"));
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sleepers_that_do_not_exist_are_refused() {
+        let settings = |texts: &[&str]| -> Vec<Setting> {
+            texts.iter().map(|text| text.parse().unwrap()).collect()
+        };
+        let some = settings(&["railpad_stiffness_N_m=9e7", "railpad_stiffness_N_m@SN9-SN12=9e7"]);
+        assert!(check_sleepers(&some, 13).is_ok());
+        let error = check_sleepers(&some, 12).unwrap_err().to_string();
+        assert_eq!(error, "--set: SN12 does not exist; the last sleeper is SN11");
+        assert!(check_whole_track(&some[..1]).is_ok());
+        let error = check_whole_track(&some).unwrap_err().to_string();
+        assert!(error.contains("remove the sleepers"), "{error}");
+    }
 
     #[test]
     fn a_value_holds_everywhere_or_where_it_says() {

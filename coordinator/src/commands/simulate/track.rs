@@ -1,6 +1,7 @@
 //! The simulated track and its description.
 
 use super::super::{OrInput, Stop};
+use super::setting::check_sleepers;
 use super::{Arguments, Drive, END_SPANS, Setting};
 use anyhow::anyhow;
 use serde_json::{Map, Value, json};
@@ -127,15 +128,7 @@ fn sleepers(
     count: usize,
     settings: &[Setting],
 ) -> Result<Vec<ParameterSet>, anyhow::Error> {
-    for Setting { sleepers, .. } in settings {
-        if let Some(last) = sleepers.as_ref().map(|range| *range.end()).filter(|&n| n >= count) {
-            return Err(anyhow!(
-                "--set: {} does not exist; the last sleeper is {}",
-                id(last),
-                id(count - 1)
-            ));
-        }
-    }
+    check_sleepers(settings, count)?;
     let set_of =
         |number| settings.iter().fold(described.nominal, |set, setting| setting.apply(set, number));
     Ok((0..count).map(set_of).collect())

@@ -44,16 +44,35 @@ impl BySpeeds {
 }
 
 /// The value for these speeds; computed if the cache lacks it.
+///
+/// The cache is not locked meanwhile: a thread that waits for its share of `compute` may begin another evaluation.
 fn kept<T>(
     cache: &Cache<T>,
     speeds: &[usize],
     compute: impl FnOnce() -> Result<T, tracktwin_surrogate::Error>,
 ) -> Result<Arc<T>, Error> {
-    let mut known = cache.lock();
-    if let Some(value) = known.get(speeds) {
-        return Ok(Arc::clone(value));
+    let known = cache.lock().get(speeds).cloned();
+    if let Some(value) = known {
+        return Ok(value);
     }
     let value = Arc::new(compute()?);
-    known.insert(speeds.to_vec(), Arc::clone(&value));
-    Ok(value)
+    // Another thread may have been faster; its value is the same.
+    Ok(Arc::clone(cache.lock().entry(speeds.to_vec()).or_insert(value)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_is_computed_without_the_lock_and_once() {
+        let cache = Cache::default();
+        let first = kept(&cache, &[0, 2], || {
+            assert!(cache.try_lock().is_some(), "an evaluation inside would wait for itself");
+            Ok(1)
+        });
+        let again = kept(&cache, &[0, 2], || panic!("it is known"));
+        assert_eq!((*first.unwrap(), *again.unwrap()), (1, 1));
+        assert_eq!(*kept(&cache, &[2], || Ok(2)).unwrap(), 2);
+    }
 }

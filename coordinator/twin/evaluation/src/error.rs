@@ -35,8 +35,8 @@ pub enum Error {
     },
     /// The sensor gain is unknown.
     #[error(
-        "recording.json: nominal.gain_known: is false; the evaluation needs levels: give \
-             accelerations in m/s2"
+        "recording.json: nominal.gain_known: is false; the evaluation needs levels: import again with \
+         `--unit m/s2` or `--unit g`"
     )]
     GainUnknown,
     /// The recording belongs to another track or vehicle.

@@ -126,9 +126,9 @@ fn unknown(recording: &Recording, speed_km_h: f64, known: &[f64]) -> Error {
     Error::UnknownSpeed { recording: recording.name.clone(), speed_km_h, known: known.to_vec() }
 }
 
-/// Index of the known speed that equals this one within the tolerance, if any.
+/// Index of the known speed that equals this one within the tolerance, if any; the nearest if there are several.
 fn equal(speed_km_h: f64, known: &[f64]) -> Option<usize> {
-    known.iter().position(|speed| (speed_km_h / speed - 1.0).abs() <= SPEED_TOLERANCE)
+    nearest(speed_km_h, known, SPEED_TOLERANCE)
 }
 
 /// Index of the known speed nearest to this one, if this one lies between two known speeds and near enough.
@@ -137,9 +137,14 @@ fn between(speed_km_h: f64, known: &[f64]) -> Option<usize> {
     if !(*lowest..=*highest).contains(&speed_km_h) {
         return None;
     }
+    nearest(speed_km_h, known, BETWEEN_MAX)
+}
+
+/// Index of the known speed nearest to this one, if their relative difference is at most `most`.
+fn nearest(speed_km_h: f64, known: &[f64], most: f64) -> Option<usize> {
     let away = |index: &usize| (speed_km_h / known[*index] - 1.0).abs();
     let nearest = (0..known.len()).min_by(|a, b| away(a).total_cmp(&away(b)))?;
-    (away(&nearest) <= BETWEEN_MAX).then_some(nearest)
+    (away(&nearest) <= most).then_some(nearest)
 }
 
 #[cfg(test)]
@@ -163,6 +168,14 @@ mod tests {
                 let expected = (nearest as f64 - share) * change(bin);
                 assert!((shift - expected).abs() < 1e-12, "{shift} {expected}");
             }
+        }
+    }
+
+    #[test]
+    fn of_two_speeds_within_the_tolerance_the_nearer_one_counts() {
+        let speeds = ModelSpeeds::only(&[80.0, 81.0, 82.0]);
+        for (speed_km_h, speed) in [(80.4, 0), (81.0, 1), (81.4, 1), (82.0, 2)] {
+            assert_eq!(speeds.of_pass(speed_km_h).map(|found| found.speed), Some(speed));
         }
     }
 
