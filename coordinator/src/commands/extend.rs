@@ -10,11 +10,14 @@ use tracktwin_diagnosis::{Diagnosis, Estimate, FORMAT, Hypothesis};
 use tracktwin_farm::campaign::Campaign;
 use tracktwin_files::Kind as FileKind;
 use tracktwin_parameters::TrackDesign;
-use tracktwin_track::extension::{Kind, KindParameter, PlaceKind};
+use tracktwin_track::extension::{Bound, Kind, KindParameter, PlaceKind};
 
 /// Share of the cases with the extension. It is below 1, so that models are also valid without the
 /// extension.
 const SHARE: f64 = 0.5;
+
+/// Largest value of a share, which is less than one.
+const SHARE_MAX: f64 = 0.99;
 
 /// Half width of a parameter's range in standard deviations of the estimate; the range also has a minimum
 /// ratio to the estimate.
@@ -230,12 +233,26 @@ fn place(
 fn range(parameter: &KindParameter, estimate: &Estimate) -> [f64; 2] {
     let factor = (DEVIATIONS * estimate.sd / estimate.mean).exp().clamp(FACTOR_MIN, 10.0);
     let least = parameter.v_track[1].min(parameter.real_scale[1]) * 1e-3;
-    [(estimate.mean / factor).max(least), (estimate.mean * factor).max(10.0 * least)]
+    let most = if parameter.bound == Bound::Share { SHARE_MAX } else { f64::INFINITY };
+    let high = (estimate.mean * factor).max(10.0 * least).min(most);
+    [(estimate.mean / factor).max(least).min(0.5 * high), high]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_range_is_within_the_bound_of_its_parameter() {
+        for parameter in Kind::all().flat_map(|kind| kind.parameters) {
+            for mean in [0.3, 0.7, 0.99] {
+                let [low, high] = range(parameter, &Estimate { mean, sd: 0.3 });
+                assert!(low < high, "{}: {low} to {high}", parameter.name);
+                let holds = parameter.bound.holds(low) && parameter.bound.holds(high);
+                assert!(holds, "{}: {low} to {high}", parameter.name);
+            }
+        }
+    }
 
     #[test]
     fn what_was_assumed_is_part_of_the_extension() {

@@ -37,7 +37,7 @@ pub enum StreamingError {
 }
 
 impl Streamed {
-    /// Whether the stream has a negative result: at most half of the sleepers have estimates inside the
+    /// Whether the stream has a negative result: less than half of the sleepers have estimates inside the
     /// library.
     pub const fn is_negative(&self) -> bool {
         2 * (self.evaluated - self.outside) < self.rows

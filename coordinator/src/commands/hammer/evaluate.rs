@@ -141,7 +141,7 @@ fn conclude(record: &HammerRecord) -> Result<(), Stop> {
     if 2 * invalid >= struck { Err(Stop::Negative) } else { Ok(()) }
 }
 
-/// Checks, before the fit, that the evaluation has a sleeper at each position of the hammer test.
+/// Checks, before the fit, that the evaluation has a sleeper at some position of the hammer test.
 fn check_places(
     track: &Track,
     sleeper_at_m: f64,

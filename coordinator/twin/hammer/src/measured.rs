@@ -101,7 +101,8 @@ pub fn select(points: &[PointReceptance], selection: &Selection) -> Selected {
         let in_range = |&index: &usize| (low..=high).contains(&point.frequencies_hz[index]);
         let range: Vec<usize> = (0..count).filter(in_range).collect();
         let is_coherent = |&index: &usize| {
-            point.coherence.as_ref().is_none_or(|all| all[index] >= selection.coherence)
+            let is_enough = |all: &Vec<f64>| all[index] >= selection.coherence && all[index] > 0.0;
+            point.coherence.as_ref().is_none_or(is_enough)
         };
         let coherent: Vec<usize> = range.iter().copied().filter(is_coherent).collect();
         inside += range.len();

@@ -6,6 +6,7 @@ use super::manifest::{FILE_NAME, Manifest, PassEntry};
 use super::odometer::Odometer;
 use super::selection::Selection;
 use super::sleeper::Sleeper;
+use super::track::doubts_on_names;
 use super::window::SleeperWindow;
 use super::{check, limits, parquet_file, quiet};
 use crate::Signal;
@@ -95,6 +96,7 @@ impl Recording {
         doubts.extend(copies.iter().map(|copy| format!("doubt: {copy}")));
         let stated = Self::of_manifest(folder, manifest, spacing_m);
         let name = stated.name.clone() + &selection.suffix();
+        doubts.extend(doubts_on_names(&stated.nominal));
         let mut recording = Self { name, passes, doubts, ..stated };
         recording.check_sleepers(&manifest_path)?;
         let gain_known = recording.gain_known();

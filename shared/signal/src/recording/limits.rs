@@ -2,6 +2,7 @@
 
 use super::error::{Fault, RecordingError};
 use super::manifest::Manifest;
+use super::track::numbers;
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use serde_json::{Map, Value};
 use std::fs::File;
@@ -54,9 +55,30 @@ pub(super) fn manifest(path: &Path, manifest: &Manifest) -> Result<(), Recording
     for (index, sleeper) in manifest.sleepers.iter().enumerate() {
         check(&format!("sleepers[{index}].x_m"), PLACE, sleeper.x_m)?;
     }
+    types(path, &manifest.nominal)?;
     for (part, name, of) in NOMINAL {
         if let Some(value) = stated(&manifest.nominal, part, name) {
             check(&format!("nominal.{part}.{name}"), of, value)?;
+        }
+    }
+    Ok(())
+}
+
+/// Checks the types of the values of `nominal`. A value may be null: it is not known.
+fn types(path: &Path, nominal: &Map<String, Value>) -> Result<(), RecordingError> {
+    let refused = |field: String, value: &Value, expected: &'static str| {
+        let fault = Fault::WrongValue { found: value.to_string(), expected };
+        Err(RecordingError::new(path, &field, fault))
+    };
+    if let Some(value) = nominal.get("gain_known").filter(|value| !value.is_boolean()) {
+        return refused("nominal.gain_known".to_owned(), value, "true or false");
+    }
+    for (part, name) in numbers() {
+        let fields = part.map_or(Some(nominal), |part| nominal.get(part)?.as_object());
+        let value = fields.and_then(|fields| fields.get(name));
+        if let Some(value) = value.filter(|value| !value.is_number() && !value.is_null()) {
+            let part = part.map_or(String::new(), |part| format!("{part}."));
+            return refused(format!("nominal.{part}{name}"), value, "a number");
         }
     }
     Ok(())

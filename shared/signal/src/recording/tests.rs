@@ -292,6 +292,10 @@ fn a_position_that_runs_back_is_named_by_its_row() {
 fn a_wrong_speed_a_short_pass_and_a_foreign_place_are_refused() {
     let text = message(|root| root["passes"][1]["speed_km_h"] = json!(13));
     assert!(text.starts_with("recording.json: passes[1].speed_km_h: is 13 km/h"), "{text}");
+    let text = message(|root| root["nominal"]["wheel"] = json!({"mass_kg": "44"}));
+    assert!(text.contains("nominal.wheel.mass_kg: is \"44\"; give a number"), "{text}");
+    let text = message(|root| root["nominal"]["gain_known"] = json!("false"));
+    assert!(text.contains("nominal.gain_known: is \"false\"; give true or false"), "{text}");
     let text = message(|root| root["nominal"]["sleeper"]["spacing_m"] = json!(0.6));
     assert!(text.contains("covers 0.500 m; the window of one sleeper needs 0.6 m"), "{text}");
     let text = message(|root| {

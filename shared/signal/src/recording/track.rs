@@ -85,6 +85,39 @@ const MASSES: [(&str, &str); 2] = [("rail", "area_m2"), ("wheel", "mass_kg")];
 /// Distance in m between the recorded wheel and the other wheel of its bogie, which runs behind it.
 const WHEELBASE: &str = "wheelbase_m";
 
+/// Names in `nominal` of what is no number, each with its object.
+const NAMES: [(Option<&str>, &str); 2] = [(RAIL, "profile"), (None, "gain_known")];
+
+/// Names of all numbers that `nominal` may have, each with its object.
+pub(super) fn numbers() -> impl Iterator<Item = (Option<&'static str>, &'static str)> {
+    let quantities = QUANTITIES.iter().chain(&FURTHER).map(|it| (it.part, it.name));
+    quantities.chain([(WHEEL, WHEELBASE)])
+}
+
+/// A doubt for each name in `nominal` that is not known: its value is not used.
+pub(super) fn doubts_on_names(nominal: &Map<String, Value>) -> Vec<String> {
+    let known: Vec<(Option<&str>, &str)> = numbers().chain(NAMES).collect();
+    let doubts_of = |part: Option<&str>, fields: &Map<String, Value>| -> Vec<String> {
+        let of_part = known.iter().filter(|(of, _)| *of == part);
+        let names: Vec<&str> = of_part.map(|(_, name)| *name).collect();
+        let is_part = |name: &str| part.is_none() && [RAIL, SLEEPER, WHEEL].contains(&Some(name));
+        let unknown =
+            fields.keys().filter(|name| !names.contains(&name.as_str()) && !is_part(name));
+        let path = part.map_or("nominal".to_owned(), |part| format!("nominal.{part}"));
+        let doubt = |name: &String| {
+            let known = names.join(", ");
+            format!(
+                "doubt: recording.json: {path}.{name} is not known, so its value is not used; known are {known}"
+            )
+        };
+        unknown.map(doubt).collect()
+    };
+    let parts = [RAIL, SLEEPER, WHEEL].into_iter().flatten();
+    let fields = parts.filter_map(|part| Some((Some(part), nominal.get(part)?.as_object()?)));
+    let all = std::iter::once((None, nominal)).chain(fields);
+    all.flat_map(|(part, fields)| doubts_of(part, fields)).collect()
+}
+
 /// A quantity in which two tracks differ by more than 2 %.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{quantity} {}, not {}", with_unit(*found, unit), with_unit(*known, unit))]
@@ -250,6 +283,19 @@ mod tests {
             spacing_m: 0.125,
             doubts: Vec::new(),
         }
+    }
+
+    #[test]
+    fn a_misspelt_name_is_doubted() {
+        let mut nominal = nominal(&TrackDesign::v_track());
+        nominal.insert("gain_known".to_owned(), json!(true));
+        assert_eq!(doubts_on_names(&nominal), [""; 0]);
+        nominal["wheel"]["mass"] = json!(44.0);
+        nominal.insert("weel".to_owned(), json!({}));
+        let [top, wheel] = &doubts_on_names(&nominal)[..] else { panic!("{nominal:?}") };
+        assert!(top.starts_with("doubt: recording.json: nominal.weel is not known"), "{top}");
+        assert!(wheel.contains("nominal.wheel.mass is not known"), "{wheel}");
+        assert!(wheel.ends_with("known are mass_kg, load_N, radius_m, wheelbase_m"), "{wheel}");
     }
 
     #[test]

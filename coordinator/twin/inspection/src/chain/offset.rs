@@ -127,6 +127,10 @@ fn compare(recording: &Recording, passes: [usize; 2]) -> Option<Offsets> {
     let (a, b) = (values(first)?, values(second)?);
     let length = (recording.spacing_m / step) as usize;
     let reach = (REACH_SPACINGS * recording.spacing_m / step) as usize;
+    if length == 0 || reach == 0 {
+        // The sample rate resolves no stretch.
+        return None;
+    }
     // Independent values of a stretch: bandwidth times duration.
     let freedom = (high - low) * length as f64 * step / speed_m_s(first);
     let mut all = Offsets {
@@ -194,6 +198,33 @@ fn best_lag(part: &[Complex64], other: &[Complex64], start: usize, reach: usize)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tracktwin_signal::Signal;
+
+    #[test]
+    fn passes_whose_sample_rate_resolves_no_stretch_are_not_compared() {
+        let pass = |seed: u32| {
+            let samples = (0..400).map(|i| f64::from((i * i + seed * i) % 101) - 50.0);
+            Pass {
+                file: seed.to_string(),
+                speed_km_h: 200.0,
+                axle: None,
+                signal: Signal::new(50.0, samples.collect()).unwrap(),
+                position_m: (0..400).map(|i| f64::from(i) * 200.0 / 3.6 / 50.0).collect(),
+                contact_loss_share: None,
+            }
+        };
+        let recording = Recording {
+            name: "slow".to_owned(),
+            sample_rate_hz: 50.0,
+            channel: String::new(),
+            passes: vec![pass(1), pass(2)],
+            sleepers: Vec::new(),
+            nominal: serde_json::Map::new(),
+            spacing_m: 0.6,
+            doubts: Vec::new(),
+        };
+        assert!(compare(&recording, [0, 1]).is_none());
+    }
 
     #[test]
     fn the_pass_that_differs_from_all_others_is_misplaced_and_of_two_both_are() {

@@ -37,7 +37,9 @@ pub struct Flat {
 pub fn flat(recording: &Recording, circumference_m: f64, alpha: f64) -> Option<Flat> {
     let passes = cells(recording, ImpactKind::Blows, true);
     let length = passes.first().map(|cells| cells.ratio.len() as f64 * cells.step_m)?;
-    if length < TURNS_MIN * circumference_m {
+    // A wheel that turns within a few cells has no phase.
+    let is_resolved = (1.0 - TOLERANCE) * circumference_m >= 2.0 * passes[0].step_m;
+    if length < TURNS_MIN * circumference_m || !is_resolved {
         return None;
     }
     let trials = trials(circumference_m, length, passes[0].step_m);

@@ -98,7 +98,7 @@ fn recording(tables: &[Table], column: &str, layout: &Layout) -> Result<Imported
 
 /// All files have one sample rate, and no file is a copy of another.
 fn alike(raw: &[Raw]) -> Result<(), RecordingError> {
-    for other in &raw[1..] {
+    for other in raw.iter().skip(1) {
         let (declared, observed) = (raw[0].rate_hz, other.rate_hz);
         if (observed / declared - 1.0).abs() > 1e-6 {
             let file = other.path.display().to_string();
