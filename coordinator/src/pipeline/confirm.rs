@@ -9,9 +9,9 @@ use tracktwin_signal::recording::Recording;
 /// Errors of confirming a diagnosis.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfirmingError {
-    /// No speed has two passes, so no pass can be withheld.
+    /// No speed has two passes that can be compared with a track, so no pass can be withheld.
     #[error(
-        "passes: no speed was passed twice; --confirm withholds the last pass of each speed that has two or \
+        "passes: no speed has two passes that can be compared; --confirm withholds the last pass of each speed that has two or \
          more: record one more pass, or leave --confirm out"
     )]
     NoPass,
@@ -56,9 +56,10 @@ pub async fn diagnose_and_confirm(
     Ok(diagnosis)
 }
 
-/// Whether some speed of a recording has at least two passes.
+/// Whether some speed of a recording has at least two passes that can be compared with a track.
 pub fn has_pass_to_withhold(recording: &Recording) -> bool {
-    !withheld(recording, &[]).is_empty()
+    let not_compared = compute(|| inspect(recording)).not_compared();
+    !withheld(recording, &not_compared).is_empty()
 }
 
 /// Numbers of the last pass of each speed that has two or more, among all passes but those with the numbers `except`.

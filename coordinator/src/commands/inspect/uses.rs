@@ -16,13 +16,13 @@ const FEATURES_HZ: f64 = SAMPLES_A_PERIOD * 4000.0;
 ///
 /// Commands are tested without `--track`: with the track that the recording states.
 pub(super) fn uses(recording: &Recording, inspection: &Inspection) -> Vec<String> {
-    let compared = compared(recording, inspection);
+    let compared = check_compared(recording, inspection);
     let evaluated = usable(recording);
     let inverted = evaluated.as_ref().map_err(String::clone).and_then(|kept| {
         let result = if kept.passes.len() == recording.passes.len() {
             compared.clone()
         } else {
-            self::compared(kept, &inspect(kept))
+            check_compared(kept, &inspect(kept))
         };
         result.map_err(|error| error.to_string())
     });
@@ -57,7 +57,7 @@ fn usable(recording: &Recording) -> Result<Recording, String> {
 }
 
 /// Whether a recording can be compared with the model of the track that it states.
-fn compared(recording: &Recording, inspection: &Inspection) -> Result<(), PreparationError> {
+fn check_compared(recording: &Recording, inspection: &Inspection) -> Result<(), PreparationError> {
     let (track, _) = stated(recording);
     check_track(recording, &track.design)?;
     let compared = inspection.comparable(&inspection.without_hum(recording));

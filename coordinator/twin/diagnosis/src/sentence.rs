@@ -162,7 +162,7 @@ fn gained(fit: &FitScores) -> String {
         return String::new();
     }
     if gain < HELD_OUT_MIN {
-        return " Speeds that the model was not fitted to do not confirm it.".to_owned();
+        return " Speeds that were held out do not confirm it.".to_owned();
     }
     format!(
         " With what was found, the model predicts speeds that it was not fitted to better by {gain:.0} nats."
@@ -251,7 +251,7 @@ mod tests {
         );
         let held_out_gain_nats = BTreeMap::from([("10".to_owned(), 6.0), ("13".to_owned(), -4.0)]);
         let doubt = gained(&FitScores { held_out_gain_nats, ..fit });
-        assert_eq!(doubt, " Speeds that the model was not fitted to do not confirm it.");
+        assert_eq!(doubt, " Speeds that were held out do not confirm it.");
     }
 
     #[test]

@@ -94,7 +94,7 @@ pub enum Fault {
     },
     /// The path of a recording is not a folder with `recording.json`.
     #[error("{0}")]
-    NoFolder(&'static str),
+    NoRecording(&'static str),
     /// The columns of a CSV file are not separated by commas.
     #[error("the columns are not separated by commas; convert the file with `tracktwin import`")]
     Separator,
@@ -175,9 +175,7 @@ pub enum Fault {
         kind: String,
     },
     /// A value is not a finite number; rows count from 1, the first row of data.
-    #[error(
-        "row {row} is {value}; leave that row out, split the pass there into two files, and list both in recording.json or after `tracktwin import`"
-    )]
+    #[error("row {row} is {value}; leave that row out, and split the pass there into two files")]
     NotFinite {
         /// The row, counted from 1.
         row: usize,
@@ -186,7 +184,8 @@ pub enum Fault {
     },
     /// A code for a missing value.
     #[error(
-        "row {row} is {value}, far from all other values: probably a code for a missing value; leave that row out, split the file there into two, and import both"
+        "row {row} is {value}, far from all other values: probably a code for a missing value; \
+             leave that row out, and split the pass there into two files"
     )]
     Missing {
         /// The row, counted from 1.

@@ -266,7 +266,7 @@ fn stated(
         None
     };
     if let Some(fault) = fault {
-        return Err(RecordingError::new(folder, "recording", Fault::NoFolder(fault)));
+        return Err(RecordingError::new(folder, "recording", Fault::NoRecording(fault)));
     }
     let manifest = read(&path)?;
     limits::manifest(&path, &manifest)?;

@@ -64,7 +64,8 @@ pub(super) fn manifest(path: &Path, manifest: &Manifest) -> Result<(), Recording
     Ok(())
 }
 
-/// Checks the types of the values of `nominal`. A value may be null: it is not known.
+/// Checks the types of the values of `nominal`. A null is as if the name were absent; as wheelbase it states that there
+/// is no other wheel.
 fn types(path: &Path, nominal: &Map<String, Value>) -> Result<(), RecordingError> {
     let refused = |field: String, value: &Value, expected: &'static str| {
         let fault = Fault::WrongValue { found: value.to_string(), expected };
