@@ -1,6 +1,25 @@
 //! One hash of all results of a campaign.
 
+use crate::result::StoredCase;
 use crate::{Library, LibraryError};
+
+/// Hash of the results that are added, by ascending index.
+pub(crate) struct Digest(blake3::Hasher);
+
+impl Digest {
+    pub(crate) fn new() -> Self {
+        Self(blake3::Hasher::new_derive_key("tracktwin library digest 2"))
+    }
+
+    pub(crate) fn add(&mut self, case: &StoredCase) {
+        self.0.update(case.checksum().as_bytes());
+    }
+
+    /// The hash in hexadecimal digits.
+    pub(crate) fn finish(&self) -> String {
+        self.0.finalize().to_hex().to_string()
+    }
+}
 
 impl Library {
     /// Returns the BLAKE3 hash (hexadecimal) of the checksums of a campaign's results, ordered by index.
@@ -14,12 +33,12 @@ impl Library {
     /// Returns [`LibraryError`] if the library cannot be read or has no such campaign.
     pub async fn digest(&self, campaign: &str) -> Result<String, LibraryError> {
         self.campaign(campaign).await?;
-        let mut hasher = blake3::Hasher::new_derive_key("tracktwin library digest 2");
-        let add = |case: crate::result::StoredCase| {
-            hasher.update(case.checksum().as_bytes());
+        let mut digest = Digest::new();
+        let add = |case: StoredCase| {
+            digest.add(&case);
             Ok(())
         };
         self.stored_cases(campaign, add).await?;
-        Ok(hasher.finalize().to_hex().to_string())
+        Ok(digest.finish())
     }
 }

@@ -118,7 +118,7 @@ pub async fn set(
     let speeds = campaign.speeds_km_h.len();
     let mut log_power = vec![Vec::new(); speeds];
     let mut values = Vec::new();
-    library
+    let library_digest = library
         .training_set(&campaign.id, |entry| {
             values.push(entry.case.parameters);
             for (table, features) in log_power.iter_mut().zip(&entry.features) {
@@ -146,7 +146,7 @@ pub async fn set(
         scales,
         parameters,
         campaign: campaign.id.clone(),
-        library_digest: library.digest(&campaign.id).await?,
+        library_digest,
         feature_definition: serde_json::to_value(&experiment.features)
             .expect("settings become JSON"),
     })

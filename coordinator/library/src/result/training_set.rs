@@ -2,10 +2,12 @@
 
 use super::entry::LibraryEntry;
 use super::stored::StoredCase;
+use crate::digest::Digest;
 use crate::{Library, LibraryError};
 
 impl Library {
-    /// Passes every finished case of a campaign to `take`, by ascending index.
+    /// Passes every finished case of a campaign to `take`, by ascending index. Returns the digest of these
+    /// cases: that of [`Library::digest`], if no case was finished since.
     ///
     /// Only one entry is in memory at a time, independent of the number of cases.
     ///
@@ -16,10 +18,15 @@ impl Library {
         &self,
         campaign: &str,
         mut take: impl FnMut(LibraryEntry),
-    ) -> Result<(), LibraryError> {
+    ) -> Result<String, LibraryError> {
         let speeds = self.campaign(campaign).await?.speeds_km_h.len();
-        let complete = |case: StoredCase| complete(case, speeds).map(&mut take);
-        self.stored_cases(campaign, complete).await
+        let mut digest = Digest::new();
+        let complete = |case: StoredCase| {
+            digest.add(&case);
+            complete(case, speeds).map(&mut take)
+        };
+        self.stored_cases(campaign, complete).await?;
+        Ok(digest.finish())
     }
 }
 

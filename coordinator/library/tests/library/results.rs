@@ -95,7 +95,8 @@ on_both_databases! {
             report(&library, "w", vec![finished(&leased[index])]).await;
         }
         let mut entries = Vec::new();
-        library.training_set(CAMPAIGN, |entry| entries.push(entry)).await.unwrap();
+        let digest = library.training_set(CAMPAIGN, |entry| entries.push(entry)).await.unwrap();
+        assert_eq!(digest, library.digest(CAMPAIGN).await.unwrap());
         let expected =
             [0, 2, 3].map(|index| LibraryEntry { case: case(index), features: features(index) });
         assert_eq!(entries, expected);

@@ -172,9 +172,11 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         None if trains => sample_for(&campaign, out, arguments.force)?,
         given => given,
     };
+    let highest_hz = recording.as_ref().filter(|_| trains).map(|it| highest_hz(it, &campaign));
+    let highest_hz = highest_hz.transpose().or_input()?;
     let url = arguments.library.clone().unwrap_or_else(|| default_library(out));
     let library = open_or_create(&url).await?;
-    let made = chain(&library, &campaign, recording, &arguments).await;
+    let made = chain(&library, &campaign, recording, highest_hz, &arguments).await;
     let name = library.name();
     // Closing leaves the library in one file, which can be copied.
     library.close().await;
@@ -223,6 +225,7 @@ async fn chain(
     library: &Library,
     campaign: &Campaign,
     recording: Option<Recording>,
+    highest_hz: Option<f64>,
     arguments: &Arguments,
 ) -> Result<Made, Stop> {
     simulate(library, campaign, arguments.cores.unwrap_or_else(all_cores)).await?;
@@ -234,7 +237,6 @@ async fn chain(
     let folder = out.join(MODELS);
     let bar = TrainingBar::default();
     let watch = |at: tracktwin_surrogate::Progress<'_>| bar.at(&at);
-    let highest_hz = recording.as_ref().map(|it| highest_hz(it, campaign));
     let force_models = force.force;
     let trained =
         models::train_into(&folder, force_models, library, &record, 0, highest_hz, &watch).await?;
@@ -268,18 +270,26 @@ fn sample_for(campaign: &Campaign, out: &Path, force: Force) -> Result<Option<Re
     }
 }
 
-/// The highest frequency in Hz that the sample rate of a recording leaves to models. A line states it if features of
-/// the campaign lie above it.
-fn highest_hz(recording: &Recording, campaign: &Campaign) -> f64 {
+/// The highest frequency in Hz that the sample rate of a recording leaves to models, if the campaign has features
+/// below it. A line states it if features of the campaign lie above it.
+fn highest_hz(recording: &Recording, campaign: &Campaign) -> Result<f64, anyhow::Error> {
     let highest_hz = (recording.sample_rate_hz / SAMPLES_A_PERIOD).floor();
-    let usual_hz = features_hz(&campaign.definition.experiment, None).last().copied();
+    let experiment = &campaign.definition.experiment;
+    if features_hz(experiment, Some(highest_hz)).is_empty() {
+        return Err(anyhow!(
+            "the recording has a sample rate of {} Hz, which suffices for features up to {highest_hz} Hz, but the \
+             campaign has none there; record at a higher rate",
+            recording.sample_rate_hz
+        ));
+    }
+    let usual_hz = features_hz(experiment, None).last().copied();
     if usual_hz.is_some_and(|usual_hz| highest_hz < usual_hz) {
         println_stderr(&format!(
             "the recording has a sample rate of {} Hz: models use features up to {highest_hz} Hz",
             recording.sample_rate_hz
         ));
     }
-    highest_hz
+    Ok(highest_hz)
 }
 
 /// Whether models of the campaign can evaluate the recording.
