@@ -6,6 +6,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
+use std::sync::LazyLock;
 use tracktwin_diagnosis::{
     Bands, Common, Evidence, Fixed, Forward, NullModel, PortPlace, PreparedRecording,
     SearchOutcome, Section, Verdict, candidates, search,
@@ -130,10 +131,17 @@ fn is_everywhere(physics: &str) -> bool {
     ["rail_cross_section", "frequency_dependent_railpad"].contains(&physics)
 }
 
+/// The recording of a bolt under the sleeper 3, and what the search for all kinds finds in it.
+static BOLT: LazyLock<(PreparedRecording, SearchOutcome)> = LazyLock::new(|| {
+    let bolt = ExtensionInstance::new("sleeper_bolt").on([3]).with("stiffness_N_per_m", 3e7);
+    let (prepared, null) = recorded(1, Some(bolt));
+    let found = search_for(&prepared, &null, |_| true);
+    (prepared, found)
+});
+
 #[test]
 fn a_bolt_under_one_sleeper_is_named_at_its_place_and_its_stiffness_found() {
-    let bolt = ExtensionInstance::new("sleeper_bolt").on([3]).with("stiffness_N_per_m", 3e7);
-    let found = searched(1, Some(bolt));
+    let (_, found) = &*BOLT;
     assert_eq!(found.accepted.len(), 1, "{:?}", found.rounds);
     assert_eq!(found.accepted[0].extension.physics, "sleeper_bolt");
     assert_eq!(found.accepted[0].extension.sleepers, Some(vec![3]));
@@ -145,9 +153,7 @@ fn a_bolt_under_one_sleeper_is_named_at_its_place_and_its_stiffness_found() {
 
 #[test]
 fn a_name_that_is_taken_back_leaves_something_unknown_of_its_family_at_its_place() {
-    let bolt = ExtensionInstance::new("sleeper_bolt").on([3]).with("stiffness_N_per_m", 3e7);
-    let (prepared, null) = recorded(1, Some(bolt));
-    let mut search = search_for(&prepared, &null, |_| true);
+    let (prepared, mut search) = BOLT.clone();
     assert_eq!(search.accepted.len(), 1, "{:?}", search.rounds);
     // As if more were left there than the name may leave.
     search.accepted.clear();

@@ -2,41 +2,82 @@
 
 use super::error::{Fault, RecordingError};
 use super::manifest::Manifest;
-use super::track::numbers;
+use super::track::{RAIL, SLEEPER, WHEEL, WHEELBASE, numbers};
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use serde_json::{Map, Value};
 use std::fs::File;
 use std::path::Path;
-use tracktwin_parameters::Quantity;
-use tracktwin_parameters::quantity::{
-    PASSES, PLACE, SAMPLE_RATE, SLEEPERS, SPACING, SPEED, WHEEL_RADIUS,
-};
+use tracktwin_parameters::quantity::{PASSES, PLACE, SAMPLE_RATE, SLEEPERS, SPEED};
+use tracktwin_parameters::{DesignNumber, Quantity};
 
 /// Bytes of text, and of unpacked numbers, that a pass's file has at most.
 const BYTES_MAX: u64 = 3_000_000_000;
 
-/// Numbers that `nominal` may state: part, name, what it can be.
-const NOMINAL: [(&str, &str, Quantity); 11] = [
-    ("rail", "area_m2", Quantity::new("area of a rail", "m2", [1e-5, 0.1], [5e-4, 1e-2])),
+/// A number of `nominal`: part, name, key in a track file, what it is, usual values.
+type Nominal = (Option<&'static str>, &'static str, &'static str, &'static str, [f64; 2]);
+
+/// Numbers that `nominal` may state.
+const NOMINAL: [Nominal; 20] = [
+    (RAIL, "area_m2", "track.rail.area_m2", "area of a rail", [5e-4, 1e-2]),
     (
-        "rail",
+        RAIL,
         "second_moment_m4",
-        Quantity::new("second moment of a rail", "m4", [1e-10, 1e-2], [1e-7, 1e-4]),
+        "track.rail.second_moment_m4",
+        "second moment of a rail",
+        [1e-7, 1e-4],
     ),
-    ("rail", "youngs_Pa", Quantity::new("Young's modulus", "Pa", [1e8, 1e13], [1e11, 3e11])),
-    ("rail", "density_kg_m3", Quantity::new("density", "kg/m3", [100.0, 5e4], [7000.0, 8000.0])),
-    ("rail", "poisson", Quantity::new("Poisson's ratio", "", [0.0, 0.5], [0.25, 0.35])),
-    ("sleeper", "spacing_m", SPACING),
+    (RAIL, "youngs_Pa", "track.rail.youngs_Pa", "Young's modulus of a rail", [1.9e11, 2.2e11]),
+    (RAIL, "density_kg_m3", "track.rail.density_kg_m3", "density of a rail", [7000.0, 8000.0]),
+    (RAIL, "poisson", "track.rail.poisson", "Poisson's ratio", [0.25, 0.35]),
+    (RAIL, "shear_coefficient", "track.rail.shear_coefficient", "shear coefficient", [0.3, 0.9]),
+    (None, "rail_damping_s", "track.rail.damping_s", "damping of the rail", [0.0, 1e-5]),
+    (None, "railhead_radius_m", "track.railhead_radius_m", "radius of the railhead", [0.05, 0.5]),
+    (SLEEPER, "spacing_m", "track.sleeper.spacing_m", "sleeper spacing", [0.1, 0.8]),
     (
-        "sleeper",
+        SLEEPER,
         "half_length_m",
-        Quantity::new("half length of a sleeper", "m", [0.02, 5.0], [0.2, 1.4]),
+        "track.sleeper.half_length_m",
+        "half length of a sleeper",
+        [0.2, 1.4],
     ),
-    ("sleeper", "density_kg_m3", Quantity::new("density", "kg/m3", [100.0, 5e4], [700.0, 8000.0])),
-    ("wheel", "mass_kg", Quantity::new("mass of a wheel", "kg", [4.0, 1e4], [10.0, 2000.0])),
-    ("wheel", "load_N", Quantity::new("wheel load", "N", [4e2, 1e6], [500.0, 2e5])),
-    ("wheel", "radius_m", WHEEL_RADIUS),
+    (SLEEPER, "rail_seat_m", "track.sleeper.rail_seat_m", "place of the rail seat", [0.0, 0.8]),
+    (SLEEPER, "area_m2", "track.sleeper.area_m2", "area of a sleeper", [5e-4, 0.08]),
+    (
+        SLEEPER,
+        "second_moment_m4",
+        "track.sleeper.second_moment_m4",
+        "second moment of a sleeper",
+        [1e-8, 5e-4],
+    ),
+    (
+        SLEEPER,
+        "youngs_Pa",
+        "track.sleeper.youngs_Pa",
+        "Young's modulus of a sleeper",
+        [1e10, 2.2e11],
+    ),
+    (
+        SLEEPER,
+        "density_kg_m3",
+        "track.sleeper.density_kg_m3",
+        "density of a sleeper",
+        [700.0, 8000.0],
+    ),
+    (SLEEPER, "poisson", "track.sleeper.poisson", "Poisson's ratio", [0.15, 0.45]),
+    (
+        SLEEPER,
+        "shear_coefficient",
+        "track.sleeper.shear_coefficient",
+        "shear coefficient",
+        [0.3, 0.9],
+    ),
+    (WHEEL, "mass_kg", "vehicle.mass_kg", "mass of a wheel", [10.0, 2000.0]),
+    (WHEEL, "load_N", "vehicle.load_N", "wheel load", [500.0, 2e5]),
+    (WHEEL, "radius_m", "vehicle.radius_m", "radius of a wheel", [0.05, 0.6]),
 ];
+
+/// Distance of the two wheels of a bogie.
+const WHEELBASE_M: Quantity = Quantity::new("wheelbase of a bogie", "m", [0.05, 30.0], [0.2, 3.5]);
 
 /// Checks that every number of `recording.json` is within its limits.
 pub(super) fn manifest(path: &Path, manifest: &Manifest) -> Result<(), RecordingError> {
@@ -56,12 +97,28 @@ pub(super) fn manifest(path: &Path, manifest: &Manifest) -> Result<(), Recording
         check(&format!("sleepers[{index}].x_m"), PLACE, sleeper.x_m)?;
     }
     types(path, &manifest.nominal)?;
-    for (part, name, of) in NOMINAL {
+    for (part, name, of) in nominal_quantities() {
         if let Some(value) = stated(&manifest.nominal, part, name) {
-            check(&format!("nominal.{part}.{name}"), of, value)?;
+            check(&path_of(part, name), of, value)?;
         }
     }
+    if let Some(value) = stated(&manifest.nominal, WHEEL, WHEELBASE) {
+        // Its sign has no meaning.
+        check(&path_of(WHEEL, WHEELBASE), WHEELBASE_M, value.abs())?;
+    }
     Ok(())
+}
+
+/// Part, name and limits of the numbers of `nominal` that a track file has as well, with the same range.
+fn nominal_quantities() -> impl Iterator<Item = (Option<&'static str>, &'static str, Quantity)> {
+    NOMINAL.into_iter().filter_map(|(part, name, key, what, usual)| {
+        let number = DesignNumber::named(key)?;
+        Some((part, name, Quantity::new(what, number.unit(), number.range(), usual)))
+    })
+}
+
+fn path_of(part: Option<&str>, name: &str) -> String {
+    part.map_or(format!("nominal.{name}"), |part| format!("nominal.{part}.{name}"))
 }
 
 /// Checks the types of the values of `nominal`. A null is as if the name were absent; as wheelbase it states that there
@@ -78,15 +135,15 @@ fn types(path: &Path, nominal: &Map<String, Value>) -> Result<(), RecordingError
         let fields = part.map_or(Some(nominal), |part| nominal.get(part)?.as_object());
         let value = fields.and_then(|fields| fields.get(name));
         if let Some(value) = value.filter(|value| !value.is_number() && !value.is_null()) {
-            let part = part.map_or(String::new(), |part| format!("{part}."));
-            return refused(format!("nominal.{part}{name}"), value, "a number");
+            return refused(path_of(part, name), value, "a number");
         }
     }
     Ok(())
 }
 
-fn stated(nominal: &Map<String, Value>, part: &str, name: &str) -> Option<f64> {
-    nominal.get(part)?.get(name)?.as_f64()
+fn stated(nominal: &Map<String, Value>, part: Option<&str>, name: &str) -> Option<f64> {
+    let fields = part.map_or(Some(nominal), |part| nominal.get(part)?.as_object())?;
+    fields.get(name)?.as_f64()
 }
 
 /// Checks that the numbers of a file fit into memory, because all of them are loaded at once.
@@ -124,7 +181,6 @@ fn unpacked(path: &Path) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tracktwin_parameters::DesignNumber;
 
     #[test]
     fn a_file_that_no_memory_holds_is_refused_before_it_is_read() {
@@ -139,21 +195,23 @@ mod tests {
     }
 
     #[test]
-    fn mass_and_load_have_the_limits_of_a_track_file() {
-        for (name, key) in [("mass_kg", "vehicle.mass_kg"), ("load_N", "vehicle.load_N")] {
-            let stated = NOMINAL.iter().find(|it| it.1 == name).map(|it| it.2.range);
-            assert_eq!(stated, DesignNumber::named(key).map(DesignNumber::range), "{key}");
+    fn every_number_of_nominal_has_limits() {
+        let limited: Vec<_> = nominal_quantities().map(|(part, name, _)| (part, name)).collect();
+        assert_eq!(limited.len(), NOMINAL.len(), "a key is not that of a track file");
+        for number in numbers() {
+            assert!(number == (WHEEL, WHEELBASE) || limited.contains(&number), "{number:?}");
         }
         // Kilonewtons.
-        let load = NOMINAL.iter().find(|it| it.1 == "load_N").unwrap().2;
+        let load = nominal_quantities().find(|it| it.1 == "load_N").unwrap().2;
         let error = load.check(60.0).unwrap_err().to_string();
         assert!(error.contains("did you mean 60000?"), "{error}");
     }
 
     #[test]
     fn what_is_usual_of_a_nominal_value_can_be() {
-        for (part, name, of) in NOMINAL {
-            assert!(of.usual.iter().all(|&usual| of.check(usual).is_ok()), "{part}.{name}");
+        for (part, name, of) in nominal_quantities() {
+            let ends = of.usual.iter().chain(&of.range);
+            assert!(ends.copied().all(|value| of.check(value).is_ok()), "{part:?}.{name}");
         }
     }
 }

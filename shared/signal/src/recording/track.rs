@@ -46,9 +46,9 @@ impl Quantity {
     }
 }
 
-const RAIL: Option<&str> = Some("rail");
-const SLEEPER: Option<&str> = Some("sleeper");
-const WHEEL: Option<&str> = Some("wheel");
+pub(super) const RAIL: Option<&str> = Some("rail");
+pub(super) const SLEEPER: Option<&str> = Some("sleeper");
+pub(super) const WHEEL: Option<&str> = Some("wheel");
 
 /// All quantities, in the order in which they are compared.
 const QUANTITIES: [Quantity; 15] = [
@@ -83,7 +83,7 @@ const FURTHER: [Quantity; 5] = [
 const MASSES: [(&str, &str); 2] = [("rail", "area_m2"), ("wheel", "mass_kg")];
 
 /// Distance in m between the recorded wheel and the other wheel of its bogie, which runs behind it.
-const WHEELBASE: &str = "wheelbase_m";
+pub(super) const WHEELBASE: &str = "wheelbase_m";
 
 /// Names in `nominal` of what is no number, each with its object.
 const NAMES: [(Option<&str>, &str); 2] = [(RAIL, "profile"), (None, "gain_known")];
