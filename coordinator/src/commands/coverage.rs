@@ -90,6 +90,10 @@ impl From<Recorder> for Making {
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let settings = settings(&arguments.settings)?;
     if arguments.method == Method::Inversion {
+        if !settings.is_empty() {
+            let reason = anyhow!("--set: adds a track to those of --method gp only; leave it out");
+            return Err(reason).or_input();
+        }
         return by_inversion(&arguments).await;
     }
     let (models, library) = models_and_library(&arguments)?;

@@ -55,7 +55,7 @@ pub enum FilesError {
         name: String,
     },
     /// The operating system returned an error.
-    #[error("{}: cannot be {action}: {source}", path.display())]
+    #[error("{}: cannot be {action}: {source}{}", path.display(), remedy(source))]
     System {
         /// The file or folder.
         path: PathBuf,
@@ -64,6 +64,16 @@ pub enum FilesError {
         /// Error of the system.
         source: std::io::Error,
     },
+}
+
+/// What to do about an error of the system, where that can be said.
+fn remedy(source: &std::io::Error) -> &'static str {
+    match source.kind() {
+        ErrorKind::NotFound => "; correct the name",
+        ErrorKind::PermissionDenied => "; change its permissions",
+        ErrorKind::StorageFull => "; free some space",
+        _ => "",
+    }
 }
 
 impl FilesError {

@@ -62,7 +62,7 @@ pub(super) const fn verdict(verdict: Verdict) -> (&'static str, &'static str, &'
         Verdict::UnknownPhysics => (
             "unknown",
             "unknown physics",
-            "the recording contains physics that the catalogue lacks",
+            "something was found that no kind of the catalogue explains",
         ),
         Verdict::MeasurementChain => (
             "chain",

@@ -77,6 +77,9 @@ pub struct Fitted {
 pub struct Round {
     /// Probability of the greatest evidence if nothing is left out.
     pub p_value: f64,
+    /// Ratio, at least one, of the squared residual before the search to that of null simulations: median over the
+    /// sleepers.
+    pub excess: f64,
     /// Share of the catalogue that would not be detected in this recording.
     pub unseen: f64,
     /// Fitted candidates, the best first.
@@ -270,8 +273,12 @@ impl SearchOutcome {
         let known: Vec<(Candidate, f64)> =
             best.map(|fitted| (fitted.candidate.clone(), fitted.log_evidence)).collect();
         let detected_shapes_m = &setting.prepared.detected_shapes_m;
-        let threshold =
-            EvidenceThreshold { accepted: &known, section: &forward.section, detected_shapes_m };
+        let threshold = EvidenceThreshold {
+            accepted: &known,
+            section: &forward.section,
+            detected_shapes_m,
+            excess: 1.0,
+        };
         let hopeless = self.rounds.last().map_or(Vec::new(), Round::hopeless);
         let (mut round, mut ports) =
             setting.round(&problem, &self.last, all, threshold, &hopeless, progress)?;
@@ -288,9 +295,12 @@ impl SearchOutcome {
                 setting.round(&problem, &self.last, all, threshold, &hopeless, progress)?;
         }
         let competitor = self.competing_unknown(&round, &ports, &forward.section);
-        if let Some(best) =
-            accepted_candidate(&round, competitor.as_ref(), setting.prepared, threshold)
-        {
+        if let Some(best) = accepted_candidate(
+            &round,
+            competitor.as_ref(),
+            setting.prepared,
+            threshold.with_excess(round.excess),
+        ) {
             progress(Stage::HeldOut, 0.0);
             round.held_out_gain =
                 self.accept_if_predictive(best, &round.fitted, setting, densities)?;

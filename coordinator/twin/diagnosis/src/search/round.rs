@@ -164,6 +164,7 @@ impl<'a> Setting<'a> {
             let kind = all[template.candidate].kind.physics;
             (kind, template.at_strengths(&current.residual, &current.gradient))
         }));
+        let threshold = threshold.with_excess(round.excess);
         if round.is_significant() {
             let outlier_starts = OutlierStarts::new(problem, far, all)?;
             let mut starts =
@@ -201,7 +202,7 @@ impl<'a> Setting<'a> {
         });
         // The better of two tests.
         let p_value = floored(2.0 * p_value.min(port_p_value));
-        Round { p_value, port, port_p_value, ..Round::default() }
+        Round { p_value, excess, port, port_p_value, ..Round::default() }
     }
 }
 

@@ -32,21 +32,34 @@ pub(super) struct EvidenceThreshold<'a> {
     pub(super) section: &'a Section,
     /// Stretches in m in which an inspection detected a shape of the rail.
     pub(super) detected_shapes_m: &'a [[f64; 2]],
+    /// Ratio, at least one, of the squared residual that the accepted ones leave to that of null simulations.
+    pub(super) excess: f64,
 }
 
 impl EvidenceThreshold<'_> {
     /// The smallest log evidence of this candidate in nats.
     ///
     /// A shape that the inspection detected away from all accepted candidates is no residual of another
-    /// effect and needs only the evidence of a first candidate.
+    /// effect and needs only the evidence of a first candidate. So does an effect at one or two sleepers beside
+    /// one without a location, whose model error is the same at all sleepers; their residual tells its size.
     pub(super) fn of(self, candidate: &Candidate) -> f64 {
         let alone = first_evidence();
         if is_local_shape(candidate) && self.is_detected_by_passes(candidate) {
             return alone;
         }
-        let known = self.accepted.iter();
-        let beside = known.map(|(known, evidence)| self.share(known, candidate) * evidence);
+        let beside = self.accepted.iter().map(|(known, evidence)| {
+            if known.is_everywhere() && is_at_few_sleepers(candidate) {
+                self.excess * alone
+            } else {
+                self.share(known, candidate) * evidence
+            }
+        });
         beside.fold(alone, f64::max)
+    }
+
+    /// The threshold in a round with this ratio of squared residuals.
+    pub(super) const fn with_excess(self, excess: f64) -> Self {
+        Self { excess, ..self }
     }
 
     /// Whether a candidate fits a random part of the surface: a local shape of the rail, on a track other than
@@ -91,6 +104,11 @@ pub(super) fn first_evidence() -> f64 {
     EVIDENCE_TEMPERING * 20_f64.ln()
 }
 
+/// Whether a candidate acts at one sleeper or at a pair.
+fn is_at_few_sleepers(candidate: &Candidate) -> bool {
+    candidate.extension.sleepers.as_ref().is_some_and(|sleepers| sleepers.len() <= 2)
+}
+
 /// Whether a candidate is a local shape of the rail. It adds power there, and its model error does not look
 /// like another track.
 pub(super) fn is_local_shape(candidate: &Candidate) -> bool {
@@ -111,7 +129,7 @@ mod tests {
         let (squat, gap) = (named("squat"), named("hanging_sleeper"));
         let [x_m, _] = squat.extension.x_m.unwrap();
         let is_random = |section: &Section, detected_shapes_m: &[[f64; 2]], candidate, evidence| {
-            EvidenceThreshold { accepted: &[], section, detected_shapes_m }
+            EvidenceThreshold { accepted: &[], section, detected_shapes_m, excess: 1.0 }
                 .is_random_surface(candidate, evidence)
         };
         assert!(is_random(&line, &[], squat, 24.0));
@@ -140,8 +158,12 @@ mod tests {
             };
             all.iter().find(is_it).unwrap()
         };
-        let threshold =
-            EvidenceThreshold { accepted: &[], section: &section, detected_shapes_m: &[] };
+        let threshold = EvidenceThreshold {
+            accepted: &[],
+            section: &section,
+            detected_shapes_m: &[],
+            excess: 1.0,
+        };
         let (bolts, axle_box) = (of("sleeper_bolt", None), of("flexible_axle_box", None));
         let (gap, far) = (of("hanging_sleeper", Some(&[3])), of("sleeper_bolt", Some(&[20])));
         let near = of("missing_railpad", Some(&[4]));
@@ -153,6 +175,12 @@ mod tests {
         assert_eq!(threshold.share(gap, bolts), 0.25);
         assert_eq!(threshold.share(joint_at(10.0), bolts), 0.0);
         assert_eq!(threshold.share(joint_at(10.0), joint_at(10.5)), 0.25);
+
+        let known = [(axle_box.clone(), 9000.0)];
+        let beside = EvidenceThreshold { accepted: &known, ..threshold };
+        assert_eq!(beside.of(gap), first_evidence());
+        assert_eq!(beside.with_excess(4.0).of(gap), 4.0 * first_evidence());
+        assert_eq!(beside.of(bolts), 0.25 * 9000.0);
 
         let joint_m = joint_at(10.0).extension.x_m.unwrap();
         let shown = EvidenceThreshold { detected_shapes_m: &[joint_m], ..threshold };
