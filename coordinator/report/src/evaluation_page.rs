@@ -29,6 +29,7 @@ pub fn evaluation_page(
     extractor: &Extractor,
     command: &str,
 ) -> String {
+    let middle = evaluation.sleepers.get(evaluation.sleepers.len() / 2).map(|it| it.x_m);
     let body = html! {
         (banner(evaluation))
         @for note in notes(evaluation) { p { (note) } }
@@ -40,10 +41,7 @@ pub fn evaluation_page(
              outside the library. Not resolved: on the library's test half the models are \
              hardly better than a constant."))
         @if let Some(inversion) = inversion { (inversion_page::section(inversion, evaluation)) }
-        h2 { "Measured data" }
-        (figure(&maps(evaluation, recording, extractor), "Five spans in the middle of the recording (paper, Fig. 2); dashed lines are \
-             sleepers. The synchrosqueezed transform (SSWT) shows the same power as the wavelet \
-             transform (CWT), sharpened in frequency."))
+        (measured_data(middle, recording, extractor))
         h2 { "Measured and matched spectra" }
         (figure(&spectra(evaluation), "Local wavelet power spectra (LWPS) of some sleepers, mean over the passes of one \
              speed, and those of the library entries nearest to them (paper, Fig. 11). At a \
@@ -137,23 +135,34 @@ fn range(evaluation: &Evaluation, parameter: Parameter) -> Option<String> {
     Some(format!("{} {low} to {high} {}", parameter.label(), shown.unit))
 }
 
-fn maps(evaluation: &Evaluation, recording: &Recording, extractor: &Extractor) -> Vec<String> {
-    let middle = evaluation.sleepers.get(evaluation.sleepers.len() / 2);
-    maps_at(middle.map(|sleeper| sleeper.x_m), recording, extractor)
-}
-
-/// Signal and maps around a position in m, in the pass at the highest speed.
-pub(crate) fn maps_at(
+/// Section with signal and maps around a position in m. It is left out if no pass covers the position.
+pub(crate) fn measured_data(
     x_m: Option<f64>,
     recording: &Recording,
     extractor: &Extractor,
-) -> Vec<String> {
-    let fastest = (0..recording.passes.len())
-        .max_by(|&a, &b| recording.passes[a].speed_km_h.total_cmp(&recording.passes[b].speed_km_h));
-    match (x_m, fastest) {
-        (Some(x_m), Some(pass)) => map_charts(recording, extractor, pass, x_m),
-        _ => Vec::new(),
+) -> Markup {
+    let charts = x_m.map_or_else(Vec::new, |x_m| maps_at(x_m, recording, extractor));
+    html! {
+        @if !charts.is_empty() {
+            h2 { "Measured data" }
+            (figure(&charts, "Five spans in the middle of the recording (paper, Fig. 2); dashed lines are \
+                 sleepers. The synchrosqueezed transform (SSWT) shows the same power as the wavelet \
+                 transform (CWT), sharpened in frequency."))
+        }
     }
+}
+
+/// Signal and maps around a position in m, in the pass at the highest speed of those that cover it.
+fn maps_at(x_m: f64, recording: &Recording, extractor: &Extractor) -> Vec<String> {
+    let covers = |pass: &usize| {
+        let positions = &recording.passes[*pass].position_m;
+        positions.first().is_some_and(|&first| first < x_m)
+            && positions.last().is_some_and(|&last| x_m < last)
+    };
+    let fastest = (0..recording.passes.len())
+        .filter(covers)
+        .max_by(|&a, &b| recording.passes[a].speed_km_h.total_cmp(&recording.passes[b].speed_km_h));
+    fastest.map_or_else(Vec::new, |pass| map_charts(recording, extractor, pass, x_m))
 }
 
 fn spectra(evaluation: &Evaluation) -> Vec<String> {

@@ -1,9 +1,9 @@
 //! The page of a hammer test: stiffness along the sleepers, unloaded and under load (paper, Fig. 23).
 
-use crate::capital;
+use crate::{capital, valid_stretches};
 use maud::{Markup, html};
 use tracktwin_drawing::{Axis, Chart, Shown, figure, page, sheet, significant};
-use tracktwin_hammer::{Beside, HammerRecord, Interval, Loaded, Sleeper};
+use tracktwin_hammer::{Beside, HammerRecord, Interval, Loaded, LoadedSleeper, Sleeper};
 use tracktwin_number::NORMAL_90;
 use tracktwin_parameters::Parameter;
 
@@ -35,7 +35,7 @@ pub fn hammer_page(
         h2 { "Along the track" }
         (figure(&charts(record, loaded.map(|it| it.0)), "Estimate at every sleeper with its 90 % interval (paper, Fig. 23). Hollow dots: not valid, the track model does not explain the receptances. Dashed grey: evaluation of a recording, under the load of the wheel."))
         h2 { "Estimates" }
-        p.note { "Estimate with its 90 % interval. In brackets: the test does not tell the value, the interval is more than half as wide as before the test. Rows in italics are not valid. Misfit: mean square of the residuals over its expectation. Railpad stiffness is that without the load of a wheel." }
+        p.note { "Estimate with its 90 % interval. In brackets: the test does not tell the value, the interval is more than half as wide as before the test. Mean of all: the test does not tell this sleeper apart, the value is the mean of all sleepers. Rows in italics are not valid. Misfit: mean square of the residuals over its expectation. Railpad stiffness is that without the load of a wheel." }
         div.scroll { (table(record)) }
         h2 { "Provenance" }
         (provenance(record, loaded.map(|it| it.0), command))
@@ -86,46 +86,53 @@ fn charts(record: &HammerRecord, loaded: Option<&Loaded>) -> Vec<String> {
 
 fn chart(record: &HammerRecord, loaded: Option<&Loaded>, parameter: Parameter) -> String {
     let shown = Shown::of(parameter);
-    let own = |valid: bool| -> Vec<(f64, Interval)> {
-        let sleepers = record.sleepers.iter().filter(|sleeper| sleeper.is_valid() == valid);
-        let scaled = |it: &Interval| Interval {
-            estimate: it.estimate / shown.divisor,
-            lower: it.lower / shown.divisor,
-            upper: it.upper / shown.divisor,
-            ..*it
-        };
-        sleepers.map(|sleeper| (sleeper.x_m, scaled(&sleeper.estimates[&parameter]))).collect()
+    let scaled = |it: &Interval| Interval {
+        estimate: it.estimate / shown.divisor,
+        lower: it.lower / shown.divisor,
+        upper: it.upper / shown.divisor,
+        ..*it
     };
-    let (valid, invalid) = (own(true), own(false));
+    let own = |sleeper: &Sleeper| (sleeper.x_m, scaled(&sleeper.estimates[&parameter]));
+    let valid: Vec<Vec<_>> = valid_stretches(&record.sleepers, Sleeper::is_valid)
+        .into_iter()
+        .map(|stretch| stretch.iter().map(own).collect())
+        .collect();
+    let invalid = record.sleepers.iter().filter(|sleeper| !sleeper.is_valid());
+    let invalid: Vec<_> = invalid.map(own).collect();
     let places = || record.sleepers.iter().map(|sleeper| sleeper.x_m);
     let (first, last) = (places().fold(f64::MAX, f64::min), places().fold(f64::MIN, f64::max));
     // Ends of a 90 % interval, as those of the hammer test.
     let under_load = |[mean, sd]: [f64; 2]| (mean / shown.divisor, NORMAL_90 * sd / shown.divisor);
-    let behind: Vec<(f64, f64, f64)> = loaded
-        .iter()
-        .flat_map(|loaded| &loaded.sleepers)
-        .filter(|sleeper| (first..=last).contains(&sleeper.x_m))
-        .filter_map(|sleeper| {
-            let (mean, half) = under_load(sleeper.estimate(parameter)?);
-            Some((sleeper.x_m, mean, half))
-        })
+    let beside = |sleeper: &LoadedSleeper| {
+        let (mean, half) = under_load(sleeper.estimate(parameter)?);
+        (first..=last).contains(&sleeper.x_m).then_some((sleeper.x_m, mean, half))
+    };
+    let loaded = loaded.map_or(&[][..], |loaded| &loaded.sleepers);
+    let behind: Vec<Vec<_>> = valid_stretches(loaded, |it: &LoadedSleeper| beside(it).is_some())
+        .into_iter()
+        .map(|stretch| stretch.iter().filter_map(beside).collect())
         .collect();
-    let ends = valid.iter().flat_map(|(_, it)| [it.lower, it.upper]);
-    let ends = ends.chain(behind.iter().flat_map(|&(_, mean, half)| [mean - half, mean + half]));
+    let ends = valid.iter().flatten().flat_map(|(_, it)| [it.lower, it.upper]);
+    let compared = behind.iter().flatten();
+    let ends = ends.chain(compared.flat_map(|&(_, mean, half)| [mean - half, mean + half]));
     let ends = ends.chain(invalid.iter().map(|(_, it)| it.estimate)).map(|end| end.max(0.0));
     let y = Axis::around(&format!("in {}", shown.unit), ends);
     let x = Axis::around("sleeper", places());
     let mut chart = Chart::new(&capital(parameter.label()), SIZE, x, y);
     if !behind.is_empty() {
-        chart.curve("was", &behind);
+        for stretch in &behind {
+            chart.curve("was", stretch);
+        }
         chart.explain("was", "under the wheel");
         chart.explain("a", "hammer test");
     }
-    let band: Vec<_> = valid.iter().map(|(x_m, it)| (*x_m, it.lower, it.upper)).collect();
-    let line: Vec<_> = valid.iter().map(|(x_m, it)| (*x_m, it.estimate)).collect();
-    chart.band("a", &band);
-    chart.line("a", line.iter().copied());
-    chart.dots("a", 2.6, &line);
+    for stretch in &valid {
+        let band: Vec<_> = stretch.iter().map(|(x_m, it)| (*x_m, it.lower, it.upper)).collect();
+        let line: Vec<_> = stretch.iter().map(|(x_m, it)| (*x_m, it.estimate)).collect();
+        chart.band("a", &band);
+        chart.line("a", line.iter().copied());
+        chart.dots("a", 2.6, &line);
+    }
     if !invalid.is_empty() {
         let points: Vec<_> = invalid.iter().map(|(x_m, it)| (*x_m, it.estimate)).collect();
         chart.dots("hollow", 2.6, &points);
@@ -159,7 +166,8 @@ fn row(sleeper: &Sleeper, parameters: &[Parameter]) -> Markup {
         let [estimate, lower, upper] =
             [it.estimate, it.lower, it.upper].map(|value| significant(value / shown.divisor));
         let text = format!("{estimate} ({lower} to {upper})");
-        if it.resolved { text } else { format!("[{text}]") }
+        let text = if it.resolved { text } else { format!("[{text}]") };
+        if it.own { text } else { format!("{text}, mean of all") }
     };
     let flags: Vec<String> =
         sleeper.flags.iter().map(|flag| flag.name().replace('_', " ")).collect();
@@ -197,5 +205,55 @@ fn provenance(record: &HammerRecord, loaded: Option<&Loaded>, command: &str) -> 
         }
         p { "To reproduce:" }
         pre { (command) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+    use tracktwin_hammer::SleeperFlag;
+
+    fn sleeper(number: u32, own: bool, flags: Vec<SleeperFlag>) -> Sleeper {
+        let interval = Interval { estimate: 8e7, lower: 7e7, upper: 9e7, resolved: true, own };
+        Sleeper {
+            id: format!("SN{number}"),
+            x_m: f64::from(number),
+            estimates: ROWS.map(|of| (of, interval)).into(),
+            misfit: Some(1.0),
+            flags,
+        }
+    }
+
+    #[test]
+    fn a_value_that_is_the_mean_of_all_sleepers_is_marked() {
+        let cell = |own: bool| {
+            row(&sleeper(1, own, Vec::new()), &[Parameter::RailpadStiffness]).into_string()
+        };
+        assert!(cell(false).contains("90.0), mean of all</td>"), "{}", cell(false));
+        assert!(!cell(true).contains("mean of all"), "{}", cell(true));
+    }
+
+    #[test]
+    fn no_line_crosses_sleepers_that_are_not_valid() {
+        let flags =
+            |number: u32| if number == 3 { vec![SleeperFlag::Unexplained] } else { Vec::new() };
+        let record = HammerRecord {
+            format: tracktwin_hammer::FORMAT,
+            code_version: "1",
+            track: "V-Track".to_owned(),
+            receptances: 5,
+            range_hz: [100.0, 4000.0],
+            model_error_db: 0.4,
+            unevenness: BTreeMap::new(),
+            prior: BTreeMap::new(),
+            sleepers: (1..=5).map(|number| sleeper(number, true, flags(number))).collect(),
+            notes: Vec::new(),
+        };
+        let chart = chart(&record, None, Parameter::RailpadStiffness);
+        for class in ["line a", "band a"] {
+            assert_eq!(chart.matches(&format!("class=\"{class}\"")).count(), 2, "{class}");
+        }
+        assert_eq!(chart.matches("class=\"dot hollow\"").count(), 1);
     }
 }

@@ -1,10 +1,10 @@
 //! The page of a recording evaluated by inversion, alone or beside the models of a library.
 
-use crate::evaluation_page::maps_at;
-use crate::{UNDER_LOAD, capital};
+use crate::evaluation_page::measured_data;
+use crate::{UNDER_LOAD, capital, valid_stretches};
 use maud::{Markup, html};
 use tracktwin_drawing::{Axis, Chart, Shown, figure, page, sheet, significant};
-use tracktwin_evaluation::{Estimate, Estimates, Evaluation};
+use tracktwin_evaluation::{Estimate, Estimates, Evaluation, SleeperEvaluation};
 use tracktwin_inversion::{COMMON, Inversion, PER_SLEEPER, Sleeper, beside};
 use tracktwin_number::rounded;
 use tracktwin_parameters::Parameter;
@@ -34,10 +34,7 @@ pub fn inversion_page(
              transition or of a soft or stiff spot."))
         (common(inversion))
         (variation(inversion))
-        h2 { "Measured data" }
-        (figure(&maps_at(middle, recording, extractor), "Five spans in the middle of the recording (paper, Fig. 2); dashed lines are \
-             sleepers. The synchrosqueezed transform (SSWT) shows the same power as the wavelet \
-             transform (CWT), sharpened in frequency."))
+        (measured_data(middle, recording, extractor))
         h2 { "Estimates" }
         p.note { "Mean ± one standard deviation. Rows in italics are not valid. Misfit: mean square of the whitened residual, about 0.7 if the track model is valid; above 2 the track model does not explain the recording there. " (UNDER_LOAD) }
         div.scroll { (table(inversion)) }
@@ -68,13 +65,12 @@ pub(crate) fn section(inversion: &Inversion, models: &Evaluation) -> Markup {
     }
 }
 
+/// Banner on the sleepers whose estimates are not valid, and the other notes below it.
 fn banner(inversion: &Inversion) -> Markup {
-    // The first note is on the sleepers whose estimates are not valid, if there are any.
-    let alerts = usize::from(inversion.outside_library.share > 0.0);
-    let (alerts, notes) = inversion.notes.split_at(alerts.min(inversion.notes.len()));
+    let alert = inversion.unexplained_sentence();
     html! {
-        @for alert in alerts { div.banner role="alert" { p { (alert) } } }
-        @for note in notes { p { (note) } }
+        @if let Some(alert) = &alert { div.banner role="alert" { p { (alert) } } }
+        @for note in inversion.notes.iter().filter(|note| Some(*note) != alert.as_ref()) { p { (note) } }
     }
 }
 
@@ -114,30 +110,36 @@ fn chart(inversion: &Inversion, models: Option<&Evaluation>, parameter: Paramete
         let Estimate { mean, sd } = *estimates.get(&parameter)?;
         Some((x_m, mean / shown.divisor, 2.0 * sd / shown.divisor))
     };
-    let own = |valid: bool| -> Vec<(f64, f64, f64)> {
-        let sleepers = inversion.sleepers.iter().filter(|sleeper| sleeper.is_valid() == valid);
-        sleepers.filter_map(|sleeper| point(sleeper.x_m, &sleeper.estimates)).collect()
-    };
-    let (valid, invalid) = (own(true), own(false));
-    let is_evaluated = |id: &str| inversion.sleepers.iter().any(|sleeper| sleeper.id == id);
-    let behind: Vec<_> = models
-        .iter()
-        .flat_map(|models| &models.sleepers)
-        .filter(|sleeper| sleeper.is_valid() && is_evaluated(&sleeper.id))
-        .filter_map(|sleeper| point(sleeper.x_m, &sleeper.estimates))
+    let own = |it: &Sleeper| point(it.x_m, &it.estimates);
+    let valid: Vec<Vec<_>> = valid_stretches(&inversion.sleepers, Sleeper::is_valid)
+        .into_iter()
+        .map(|stretch| stretch.iter().filter_map(own).collect())
         .collect();
-    let drawn = || valid.iter().chain(&behind);
+    let invalid = inversion.sleepers.iter().filter(|sleeper| !sleeper.is_valid());
+    let invalid: Vec<_> = invalid.filter_map(own).collect();
+    let is_evaluated = |id: &str| inversion.sleepers.iter().any(|sleeper| sleeper.id == id);
+    let beside = models.map_or(&[][..], |models| &models.sleepers);
+    let behind: Vec<Vec<_>> =
+        valid_stretches(beside, |it: &SleeperEvaluation| it.is_valid() && is_evaluated(&it.id))
+            .into_iter()
+            .map(|stretch| stretch.iter().filter_map(|it| point(it.x_m, &it.estimates)).collect())
+            .collect();
+    let drawn = || valid.iter().chain(&behind).flatten();
     let ends = drawn().flat_map(|&(_, mean, two)| [mean - two, mean + two]);
     let ends = ends.chain(invalid.iter().map(|p| p.1)).map(|end| end.max(0.0));
     let y = Axis::around(&format!("in {}", shown.unit), ends);
     let x = Axis::around("sleeper", inversion.sleepers.iter().map(|sleeper| sleeper.x_m));
     let mut chart = Chart::new(&capital(parameter.label()), SIZE, x, y);
     if !behind.is_empty() {
-        chart.curve("was", &behind);
+        for stretch in &behind {
+            chart.curve("was", stretch);
+        }
         chart.explain("was", "Gaussian processes");
         chart.explain("a", "inversion");
     }
-    chart.curve("a", &valid);
+    for stretch in &valid {
+        chart.curve("a", stretch);
+    }
     if parameter == Parameter::BallastStiffness {
         let is_end = |sleeper: &&Sleeper| {
             inversion.support_changes.iter().any(|change| change.sleepers.contains(&sleeper.id))
@@ -234,5 +236,70 @@ fn provenance(inversion: &Inversion, command: &str) -> Markup {
         }
         p { "To reproduce:" }
         pre { (command) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+    use tracktwin_evaluation::{FORMAT, Flag};
+    use tracktwin_inversion::{METHOD, Provenance, Unexplained};
+
+    /// An inversion of one speed; `valid` says of each sleeper whether its estimates are valid.
+    fn inversion(valid: &[bool]) -> Inversion {
+        let sleeper = |(number, &valid): (u32, &bool)| Sleeper {
+            id: format!("SN{number}"),
+            x_m: f64::from(number),
+            estimates: PER_SLEEPER.map(|of| (of, Estimate { mean: 1e7, sd: 1e6 })).into(),
+            misfit: 0.7,
+            flags: if valid { Vec::new() } else { vec![Flag::OutsideLibrary] },
+        };
+        let mut inversion = Inversion {
+            format: FORMAT,
+            recording: "ride".to_owned(),
+            method: METHOD,
+            provenance: Provenance {
+                code_version: "1",
+                speeds_km_h: vec![13.0],
+                passes: vec![1],
+                prior: BTreeMap::new(),
+                variation: BTreeMap::new(),
+            },
+            sleepers: (1..).zip(valid).map(sleeper).collect(),
+            unevaluated: Vec::new(),
+            support_changes: Vec::new(),
+            outside_library: Unexplained::default(),
+            notes: Vec::new(),
+        };
+        inversion.notes = inversion.sentences();
+        inversion
+    }
+
+    #[test]
+    fn the_banner_holds_the_sentence_on_invalid_estimates_wherever_it_stands_in_the_notes() {
+        let mut inversion = inversion(&[true, false]);
+        inversion.notes.insert(0, "left out: pass 2".to_owned());
+        let text = banner(&inversion).into_string();
+        let (alert, notes) = text.split_once("</div>").unwrap();
+        assert!(alert.contains("at 1 of 2 sleepers (SN2)"), "{text}");
+        assert!(notes.contains("left out: pass 2") && notes.contains("One speed only"), "{text}");
+        assert!(!notes.contains("not valid"), "{text}");
+    }
+
+    #[test]
+    fn without_invalid_estimates_there_is_no_banner() {
+        let text = banner(&inversion(&[true; 2])).into_string();
+        assert!(!text.contains("role=\"alert\"") && text.contains("One speed only"), "{text}");
+    }
+
+    #[test]
+    fn no_line_crosses_sleepers_that_are_not_valid() {
+        let inversion = inversion(&[true, true, false, true, true]);
+        let chart = chart(&inversion, None, Parameter::RailpadStiffness);
+        for class in ["line a", "band a"] {
+            assert_eq!(chart.matches(&format!("class=\"{class}\"")).count(), 2, "{class}");
+        }
+        assert_eq!(chart.matches("class=\"dot hollow\"").count(), 1);
     }
 }

@@ -39,6 +39,13 @@ fn capital(text: &str) -> String {
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
+/// Neighbouring items for which `is_valid` holds, stretch by stretch. A line through each stretch does not
+/// cross the items between them.
+fn valid_stretches<T>(items: &[T], is_valid: impl Fn(&T) -> bool) -> Vec<&[T]> {
+    let alike = items.chunk_by(|a, b| is_valid(a) == is_valid(b));
+    alike.filter(|stretch| is_valid(&stretch[0])).collect()
+}
+
 /// Lowest and highest of ascending frequencies.
 fn range_hz(frequencies_hz: &[f64]) -> String {
     let [from, to] = [frequencies_hz.first(), frequencies_hz.last()]

@@ -17,8 +17,8 @@ const SPACINGS: f64 = 2.5;
 /// Number of columns of the drawn signal; each has the lowest and the highest value.
 const SIGNAL_COLUMNS: usize = 1000;
 
-/// Charts of signal, CWT and SSWT over five spans around `x_m` in one pass; empty if they cannot be
-/// computed.
+/// Charts of signal, CWT and SSWT over five spans around `x_m` in one pass, which must cover `x_m`. A map
+/// that cannot be computed is left out.
 pub(crate) fn map_charts(
     recording: &Recording,
     extractor: &Extractor,

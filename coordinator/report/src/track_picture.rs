@@ -1,5 +1,6 @@
 //! Parameters along the track with their uncertainty (paper, Fig. 20).
 
+use crate::valid_stretches;
 use tracktwin_drawing::{Axis, Chart, Shown, sheet};
 use tracktwin_evaluation::{Estimates, Evaluation, SleeperEvaluation};
 use tracktwin_parameters::Parameter;
@@ -76,8 +77,8 @@ fn draw(chart: &mut Chart, process: &[ChartEstimate], selector: &[ChartEstimate]
     // The models know nothing beyond the library's range.
     let within = |value: f64| value.clamp(range[0], range[1]);
     let stretches = |of: &[ChartEstimate]| -> Vec<Vec<(f64, f64, f64)>> {
-        let alike = of.chunk_by(|a, b| a.valid == b.valid).filter(|stretch| stretch[0].valid);
-        alike.map(|it| it.iter().map(|p| (p.x_m, p.mean, p.two_sd)).collect()).collect()
+        let valid = valid_stretches(of, |estimate| estimate.valid).into_iter();
+        valid.map(|it| it.iter().map(|p| (p.x_m, p.mean, p.two_sd)).collect()).collect()
     };
     let points = |of: &[(f64, f64, f64)]| of.iter().map(|p| (p.0, p.1)).collect::<Vec<_>>();
     for stretch in stretches(process) {

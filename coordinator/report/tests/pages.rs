@@ -203,6 +203,26 @@ fn the_page_of_an_evaluation_shows_every_sleeper_and_every_picture() {
 }
 
 #[test]
+fn maps_are_of_the_fastest_pass_that_covers_the_middle() {
+    let mut recording = recording();
+    let extractor = Extractor::new(&FeatureDefinition::default()).expect("default features");
+    let evaluation = evaluation(&recording, &extractor);
+    let whole = recording.passes[0].clone();
+    // The pass ends before the track, then begins behind it.
+    for beside_m in [-5.0, 5.0] {
+        let moved = whole.position_m.iter().map(|x_m| x_m + beside_m).collect();
+        recording.passes = vec![Pass { position_m: moved, ..whole.clone() }];
+        let page = evaluation_page(&evaluation, None, &recording, &extractor, "");
+        assert_eq!(page.matches("class=\"chart\"").count(), 6 + 4);
+        assert!(!page.contains("Measured data"));
+    }
+    recording.passes.push(Pass { speed_km_h: 7.0, ..whole });
+    let page = evaluation_page(&evaluation, None, &recording, &extractor, "");
+    assert_eq!(page.matches("class=\"chart\"").count(), 6 + 3 + 4);
+    assert!(page.contains("Axle-box acceleration, 7 km/h"));
+}
+
+#[test]
 fn estimates_outside_the_library_are_drawn_and_said_as_not_valid() {
     let recording = recording();
     let extractor = Extractor::new(&FeatureDefinition::default()).expect("the usual features");

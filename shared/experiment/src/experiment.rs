@@ -1,17 +1,19 @@
 //! Experiment of a campaign: all settings except the parameters that determine results.
 
+use crate::ExperimentError;
 use serde::{Deserialize, Serialize};
 use tracktwin_parameters::quantity::SPEED;
-use tracktwin_parameters::{DesignAxis, DesignAxisError, QuantityError, TrackDesign};
+use tracktwin_parameters::{DesignAxis, TrackDesign, check_wavelengths};
 use tracktwin_signal::{FeatureDefinition, FeatureError, ThirdOctave};
-use tracktwin_track::extension::{InstanceError, SampledExtension};
+use tracktwin_track::extension::SampledExtension;
+use tracktwin_track::model::Vehicle;
 
 /// Smallest number of spans between the evaluated stretch and the held ends of the rail.
-const END_SPANS: f64 = 8.0;
+pub(crate) const END_SPANS: f64 = 8.0;
 
 /// Largest number of time steps of a pass: a hundred times that of the built-in campaign, at least 16 MB
 /// per case.
-const STEPS_MAX: f64 = 2e6;
+pub(crate) const STEPS_MAX: f64 = 2e6;
 
 /// Km/h in a m/s.
 const KM_H: f64 = 3.6;
@@ -54,85 +56,6 @@ pub struct Experiment {
     /// evaluated sleeper has the index `spans / 2 - 1`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub extensions: Vec<SampledExtension>,
-}
-
-/// Why an experiment is not possible. Each error names the setting.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ExperimentError {
-    /// Speeds are missing, not positive, or not in order.
-    #[error(
-        "speeds_km_h: {speeds:?} must be one or more positive speeds in ascending order \
-         without duplicates"
-    )]
-    Speeds {
-        /// The speeds.
-        speeds: Vec<f64>,
-    },
-    /// A number is outside its allowed range.
-    #[error("{setting}: {value} must lie in {low} to {high}")]
-    OutOfRange {
-        /// The setting.
-        setting: &'static str,
-        /// Its value.
-        value: f64,
-        /// Lowest value.
-        low: f64,
-        /// Highest value.
-        high: f64,
-    },
-    /// A speed is outside its allowed range.
-    #[error("speeds_km_h: {0}")]
-    Speed(#[from] QuantityError),
-    /// A pass has more time steps than fit into memory.
-    #[error(
-        "time_step_s: {time_step_s:e} gives {steps:.1e} steps at {speed_km_h} km/h, but the \
-             limit is {STEPS_MAX:.0e}; use a longer step or higher speeds"
-    )]
-    TooManySteps {
-        /// The time step, in s.
-        time_step_s: f64,
-        /// Number of time steps of the slowest pass.
-        steps: f64,
-        /// Speed of this pass in km/h.
-        speed_km_h: f64,
-    },
-    /// Wavelengths are not positive or not in order.
-    #[error("wavelengths_m: {wavelengths:?} must be two positive lengths, the shorter first")]
-    Wavelengths {
-        /// The wavelengths.
-        wavelengths: [f64; 2],
-    },
-    /// The recorded stretch is too near to the held ends of the rail.
-    #[error(
-        "spans: {spans} is too small for {speed_km_h} km/h: the evaluated sleepers must be \
-             {END_SPANS} spans away from the ends of the rail; use {needed} spans"
-    )]
-    TooShort {
-        /// Number of spans of the track.
-        spans: usize,
-        /// Speed in km/h.
-        speed_km_h: f64,
-        /// Smallest sufficient number of spans.
-        needed: usize,
-    },
-    /// A varied number of the design is invalid.
-    #[error("parameters.{0}")]
-    Design(#[from] DesignAxisError),
-    /// An extension is invalid.
-    #[error("extension: {0}")]
-    Extension(#[from] InstanceError),
-    /// The features can't be extracted.
-    #[error(transparent)]
-    Features(#[from] FeatureError),
-    /// The features lack one-third octaves that the library stores.
-    #[error("features: the range must hold all one-third octaves from 50 to 4000 Hz")]
-    Bands,
-    /// The text is not the JSON of an experiment of this program version.
-    #[error("not an experiment: {message}")]
-    Json {
-        /// Error of the parser.
-        message: String,
-    },
 }
 
 /// Stretch of the wheel at one speed, and its recorded part.
@@ -183,10 +106,7 @@ impl Experiment {
         if self.features.bands().count() != ThirdOctave::COUNT {
             return Err(ExperimentError::Bands);
         }
-        let [shortest, longest] = self.wavelengths_m;
-        if !(shortest > 0.0 && shortest < longest && longest.is_finite()) {
-            return Err(ExperimentError::Wavelengths { wavelengths: self.wavelengths_m });
-        }
+        check_wavelengths(self.wavelengths_m)?;
         let range = |setting, value: f64, [low, high]: [f64; 2]| {
             let fits = (low..=high).contains(&value);
             if fits {
@@ -205,9 +125,15 @@ impl Experiment {
         for design in self.end_designs() {
             self.check_room(&design)?;
             self.check_steps(&design)?;
+            let mut wheels_m = design.wheel.further_wheels_m.clone();
             for extension in &self.extensions {
-                extension.check(&design, self.spans)?;
+                for at_end in extension.checked(&design, self.spans)? {
+                    let mut vehicle = Vehicle::rigid(&design.wheel);
+                    at_end.equip(&mut vehicle);
+                    wheels_m.extend(vehicle.further_wheels_m);
+                }
             }
+            self.check_wheels(&design, &wheels_m)?;
         }
         Ok(self)
     }
@@ -292,6 +218,25 @@ impl Experiment {
         }
         Ok(())
     }
+
+    /// Every further wheel stays on the track. `wheels_m` are the distances in m in front of the first one.
+    fn check_wheels(&self, design: &TrackDesign, wheels_m: &[f64]) -> Result<(), ExperimentError> {
+        let speed_km_h = self.speeds_km_h.iter().copied().fold(0.0, f64::max);
+        let (spans, spacing) = (self.spans, design.sleeper.spacing_m);
+        let Stretch { start_m, end_m, .. } = self.stretch(design, speed_km_h);
+        let length_m = spans as f64 * spacing;
+        let beyond_m = |ahead_m: f64| (-(start_m + ahead_m)).max(end_m + ahead_m - length_m);
+        let farthest =
+            wheels_m.iter().copied().max_by(|a, b| beyond_m(*a).total_cmp(&beyond_m(*b)));
+        match farthest.map(|ahead_m| (ahead_m, beyond_m(ahead_m))) {
+            Some((ahead_m, beyond_m)) if beyond_m > 0.0 => {
+                // More spans move both ends of the track away from its middle.
+                let needed = spans + 2 * (beyond_m / spacing).ceil() as usize + 1;
+                Err(ExperimentError::WheelOffTrack { spans, ahead_m, speed_km_h, needed })
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 /// A speed in m/s.
@@ -302,6 +247,9 @@ pub fn metres_per_second(speed_km_h: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::BTreeMap;
+    use tracktwin_parameters::Scale;
+    use tracktwin_track::extension::SampledValue;
 
     fn experiment() -> Experiment {
         Experiment::new(TrackDesign::v_track())
@@ -345,6 +293,29 @@ mod tests {
         };
         longer.spans = needed;
         longer.checked().unwrap();
+    }
+
+    #[test]
+    fn a_wheel_that_leaves_the_track_is_refused_with_a_length_that_suffices() {
+        for ahead_m in [3.2, -3.2] {
+            let mut far = experiment();
+            far.design.wheel.further_wheels_m = vec![0.3, ahead_m];
+            let Err(ExperimentError::WheelOffTrack { needed, .. }) = far.clone().checked() else {
+                panic!("a wheel {ahead_m} m ahead leaves a track of 5 m")
+            };
+            far.spans = needed;
+            far.checked().unwrap();
+        }
+        let distance = SampledValue::Scaled { low: 0.8, high: 3.2, scale: Scale::Logarithmic };
+        let wheel = SampledExtension {
+            physics: "second_wheel".to_owned(),
+            x_m: None,
+            sleepers: None,
+            share: 0.5,
+            parameters: BTreeMap::from([("distance_m".to_owned(), distance)]),
+        };
+        let message = refusal(|experiment| experiment.extensions = vec![wheel]);
+        assert!(message.contains("the wheel 3.2 m ahead"), "{message}");
     }
 
     #[test]

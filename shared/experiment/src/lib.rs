@@ -41,11 +41,13 @@
 //! ```
 
 mod drawn;
+mod error;
 mod experiment;
 mod outcome;
 mod simulate;
 
-pub use experiment::{Experiment, ExperimentError, metres_per_second};
+pub use error::ExperimentError;
+pub use experiment::{Experiment, metres_per_second};
 pub use outcome::{Outcome, PassFeatures};
 pub use simulate::{Prepare, Simulate, Simulation, prepare_simulation};
 pub use tracktwin_parameters::Case;

@@ -1,6 +1,7 @@
 //! Simulation of a case: parameters, track model, one pass per speed, signal, features.
 
-use crate::experiment::{Experiment, ExperimentError, Stretch, metres_per_second};
+use crate::ExperimentError;
+use crate::experiment::{Experiment, Stretch, metres_per_second};
 use crate::outcome::{Outcome, PassFeatures};
 use std::ops::Range;
 use tracktwin_parameters::{Case, Parameter};

@@ -18,6 +18,7 @@ mod set;
 mod sobol;
 mod space;
 mod track;
+mod wavelengths;
 
 pub use case::Case;
 pub use catalogue::Parameter;
@@ -31,3 +32,4 @@ pub use set::ParameterSet;
 pub use sobol::{OWEN_POINTS_MAX, Sequence, SobolError};
 pub use space::{Axis, ParameterSpace, Scale, SpaceError};
 pub use track::{TRACK_FORMAT, Track, TrackError, toml_fault};
+pub use wavelengths::{WavelengthsError, check_wavelengths};

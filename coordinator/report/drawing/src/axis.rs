@@ -16,12 +16,14 @@ impl Axis {
     /// A linear axis that covers these values, with a margin at both ends.
     pub fn around(label: &str, values: impl IntoIterator<Item = f64>) -> Self {
         let [low, high] = ends(values);
-        let room = if high > low { 0.05 * (high - low) } else { 0.5 * high.abs().max(1.0) };
+        let room = 0.05 * (high - low);
         Self::linear(label, low - room, high + room)
     }
 
-    /// A linear axis from `low` to `high`.
+    /// A linear axis from `low` to `high`. Equal ends are moved apart, because an axis has a length.
     pub fn linear(label: &str, low: f64, high: f64) -> Self {
+        let room = if low == high { 0.5 * high.abs().max(1.0) } else { 0.0 };
+        let (low, high) = (low - room, high + room);
         Self { label: label.to_owned(), low, high, logarithmic: false, step: None }
     }
 
@@ -152,5 +154,8 @@ mod tests {
     #[test]
     fn an_axis_around_one_value_still_has_a_length() {
         assert!(!Axis::around("", [3.0]).ticks(5).is_empty());
+        let equal_ends = Axis::linear("", 3.0, 3.0);
+        assert_eq!((equal_ends.ends(), equal_ends.place(3.0)), ([1.5, 4.5], 0.5));
+        assert!(!equal_ends.ticks(5).is_empty());
     }
 }

@@ -56,13 +56,14 @@ impl Chart {
     }
 
     /// Adds a line through mean values, with a band around the line. A point is x, mean, and half width of
-    /// the band. The reference line (class `was`) is drawn behind the others and without dots.
+    /// the band. The reference line (class `was`) is drawn behind the others and without dots, except for a
+    /// single point.
     pub fn curve(&mut self, class: &str, points: &[(f64, f64, f64)]) {
         let band: Vec<_> = points.iter().map(|&(x, y, half)| (x, y - half, y + half)).collect();
         let means: Vec<_> = points.iter().map(|&(x, y, _)| (x, y)).collect();
         self.band(class, &band);
         self.line(class, means.iter().copied());
-        if class != "was" {
+        if class != "was" || means.len() == 1 {
             self.dots(class, 2.6, &means);
         }
     }

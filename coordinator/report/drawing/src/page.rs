@@ -17,7 +17,7 @@ pub const CHART_STYLE: &str = "
 .line.a{stroke:var(--a)}.line.b{stroke:var(--b)}.line.c{stroke:var(--c)}.line.d{stroke:var(--d)}.line.e{stroke:var(--e)}.line.f{stroke:var(--f)}.line.ink{stroke:var(--ink)}
 .band.a,.dot.a,.bar.a,.key.a{fill:var(--a)}.band.b,.dot.b,.bar.b,.key.b{fill:var(--b)}.band.c,.dot.c,.bar.c,.key.c{fill:var(--c)}
 .dot.d,.bar.d,.key.d{fill:var(--d)}.dot.e,.bar.e,.key.e{fill:var(--e)}.dot.f,.bar.f,.key.f{fill:var(--f)}.key.ink{fill:var(--ink)}.dot.pale{opacity:.35}
-.line.was{stroke:var(--dim);stroke-width:1.2;stroke-dasharray:5 3}.band.was{fill:var(--dim);opacity:.14}.key.was{fill:var(--dim);opacity:.6}
+.line.was{stroke:var(--dim);stroke-width:1.2;stroke-dasharray:5 3}.band.was{fill:var(--dim);opacity:.14}.dot.was{fill:var(--dim)}.key.was{fill:var(--dim);opacity:.6}
 .dot.hollow{fill:var(--paper);stroke:var(--dim)}.key.hollow{fill:var(--paper);stroke:var(--dim)}
 ";
 

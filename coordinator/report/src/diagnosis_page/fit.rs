@@ -10,6 +10,12 @@ use tracktwin_diagnosis::{Diagnosis, Score, Scores};
 /// Section with the scores, and with differences and gains by speed.
 pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
     let fit = &diagnosis.fit;
+    if diagnosis.track.is_empty() && fit.before.held_out.is_none() {
+        return html! {
+            h2 { "Goodness of fit" }
+            p { "No track model was compared and nothing was fitted, so there are no scores." }
+        };
+    }
     // Where no track was compared the first that was found is what the scores are about.
     let alone = || accepted(diagnosis).next().map(|found| physics(&found.physics));
     let with = addition(diagnosis).or_else(|| alone().filter(|_| diagnosis.track.is_empty()));

@@ -182,6 +182,17 @@ fn one_speed_says_that_nothing_could_be_withheld() {
 }
 
 #[test]
+fn passes_alone_without_a_fit_have_no_scores() {
+    let mut alone = Diagnosis { levels: Levels::default(), track: Vec::new(), ..chain() };
+    alone.fit.before.held_out = None;
+    alone.fit.after.held_out = None;
+    alone.fit.held_out_gain_nats.clear();
+    let page = page("alone", &alone);
+    assert_reads(&page, &["nothing was fitted"]);
+    assert!(!page.contains("withheld"), "nothing was withheld");
+}
+
+#[test]
 fn a_kilometre_of_track_stays_a_page_of_a_megabyte() {
     const TIMES: usize = 60;
     let mut long = consistent();

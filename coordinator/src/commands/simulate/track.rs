@@ -38,7 +38,18 @@ impl SimulatedTrack {
             .collect::<Result<_, _>>()
             .or_input()?;
         let model = TrackModel::build(&design, &mesh, &supports, &extensions).or_input()?;
-        Ok(Self { described, spans, sleepers, extensions: instances, model })
+        let simulated = Self { described, spans, sleepers, extensions: instances, model };
+        let [from_m, to_m] = simulated.recorded_m();
+        if from_m >= to_m {
+            let spacing_m = simulated.described.design.sleeper.spacing_m;
+            let needed = spans + ((from_m - to_m) / spacing_m).ceil() as usize + 1;
+            return Err(anyhow!(
+                "--spans: {spans} is too small, because every wheel must stay {END_SPANS} spans away from the ends of \
+                 the track; give {needed} or more"
+            ))
+            .or_input();
+        }
+        Ok(simulated)
     }
 
     pub(super) fn design(&self) -> &TrackDesign {

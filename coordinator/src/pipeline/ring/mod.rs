@@ -27,6 +27,7 @@ use tracktwin_parameters::Preset;
 use tracktwin_ring::{Estimated, Method, RailSpectra, Ring, Study};
 use tracktwin_signal::recording::Recording;
 use tracktwin_signal::{Extractor, FeatureDefinition};
+use tracktwin_surrogate::Trained;
 
 /// Number of digits of a library's digest in the name of a folder.
 const DIGEST_SHOWN: usize = 12;
@@ -200,11 +201,7 @@ impl RingStudy<'_> {
         models: &Evaluator,
         study: &mut Study,
     ) -> Result<(), RingStudyError> {
-        // Models of other results, or of another half of them, give other estimates.
-        let trained = models.models();
-        let digest: String = trained.library_digest().chars().take(DIGEST_SHOWN).collect();
-        let name = format!("models-{digest}-seed-{}", trained.split_seed());
-        let folder = self.folder.join(EVALUATIONS).join(name);
+        let folder = self.folder.join(EVALUATIONS).join(models_name(models.models()));
         let path = folder.join(EVALUATION);
         if !path.exists() {
             let design = models.design_for(recording);
@@ -221,6 +218,14 @@ impl RingStudy<'_> {
         study.methods.extend(selected.map(|selected| (Method::Selector, selected)));
         Ok(())
     }
+}
+
+/// Name of the folder of an evaluation with models. Models of other results, of another half of them, or of
+/// features up to another frequency give other estimates.
+fn models_name(trained: &Trained) -> String {
+    let digest: String = trained.library_digest().chars().take(DIGEST_SHOWN).collect();
+    let bins = trained.frequencies_hz().len();
+    format!("models-{digest}-seed-{}-bins-{bins}", trained.split_seed())
 }
 
 /// Spectra of the rails at the highest speed.

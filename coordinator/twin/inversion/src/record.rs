@@ -152,10 +152,24 @@ impl Inversion {
         inversion
     }
 
-    /// Sentences on a single speed, on sleepers that the track model does not explain, on support changes, on sleepers that differ from
-    /// their neighbours, and on those whose railpad stiffness is a lower bound.
-    pub fn sentences(&self) -> Vec<String> {
+    /// Sentence on the sleepers that the track model does not explain, as it stands in the notes. `None` if
+    /// the estimates of all sleepers are valid.
+    pub fn unexplained_sentence(&self) -> Option<String> {
         let unexplained = self.with(Flag::OutsideLibrary);
+        (!unexplained.is_empty()).then(|| {
+            format!(
+                "The track model does not explain what was measured at {} of {} sleepers ({}): the \
+                 estimates there are not valid. `tracktwin diagnose` says what may be missing.",
+                unexplained.len(),
+                self.sleepers.len(),
+                listed(&unexplained)
+            )
+        })
+    }
+
+    /// Sentences on a single speed, on sleepers that the track model does not explain, on support changes,
+    /// on sleepers that differ from their neighbours, and on those whose railpad stiffness is a lower bound.
+    pub fn sentences(&self) -> Vec<String> {
         let apart = self.with(Flag::UnlikeNeighbours);
         let mut sentences = Vec::new();
         if let [speed_km_h] = self.provenance.speeds_km_h[..] {
@@ -164,15 +178,7 @@ impl Inversion {
                  estimates and support changes may be wrong. Add a pass at another speed."
             ));
         }
-        if !unexplained.is_empty() {
-            sentences.push(format!(
-                "The track model does not explain what was measured at {} of {} sleepers ({}): the \
-                 estimates there are not valid. `tracktwin diagnose` says what may be missing.",
-                unexplained.len(),
-                self.sleepers.len(),
-                listed(&unexplained)
-            ));
-        }
+        sentences.extend(self.unexplained_sentence());
         sentences.extend(self.support_changes.iter().map(FoundSupportChange::sentence));
         if !apart.is_empty() {
             sentences.push(format!(

@@ -45,14 +45,10 @@ struct Structure {
 }
 
 impl Structure {
+    /// Whether its kind is named at one of its sleepers or more.
     fn is_named(&self, accepted: &[Accepted]) -> bool {
-        accepted.iter().any(|it| self.is(it))
-    }
-
-    /// Whether this is its kind, at one of its sleepers.
-    fn is(&self, accepted: &Accepted) -> bool {
-        let here = |id: &String| self.sleepers.contains(id);
-        accepted.physics == self.physics && accepted.sleepers.iter().any(here)
+        let here = |it: &Accepted| it.sleepers.iter().any(|id| self.sleepers.contains(id));
+        accepted.iter().any(|it| it.physics == self.physics && here(it))
     }
 }
 
@@ -111,7 +107,7 @@ pub(crate) fn statements(study: &Study) -> Vec<Statement> {
             [
                 "Nothing else is named",
                 "-",
-                "no kind that the ring does not have, and none at a wrong sleeper, in any lap",
+                "no kind that the ring does not have, and no sleeper without the named kind, in any lap",
             ],
             Some(others(study, &all)),
         ),
@@ -133,18 +129,31 @@ fn named(study: &Study, some: &[&Structure], least: f64) -> Found {
     Found::new(counts.iter().all(enough), texts.join(", "))
 }
 
+/// Kinds that the ring does not have, and sleepers that do not have the kind that is named there.
 fn others(study: &Study, all: &[Structure]) -> Found {
-    // A known kind without a place is at no wrong one.
-    let placeless =
-        |it: &Accepted, of: &Structure| it.sleepers.is_empty() && it.physics == of.physics;
-    let known = |it: &Accepted| all.iter().any(|of| of.is(it) || placeless(it, of));
-    let accepted = (1..).zip(&study.diagnoses.laps).flat_map(|(lap, accepted)| {
-        let others = accepted.iter().filter(|it| !known(it));
-        others.map(move |it| format!("lap {lap}: {} {}", it.physics, it.sleepers.join(" ")))
-    });
-    let texts: Vec<_> = accepted.map(|text| text.trim_end().to_owned()).collect();
+    let mut texts = Vec::new();
+    for (lap, accepted) in (1..).zip(&study.diagnoses.laps) {
+        for it in accepted {
+            let is_known = all.iter().any(|of| of.physics == it.physics);
+            let wrong = wrong_sleepers(it, all);
+            // A known kind without a place is at no wrong sleeper.
+            if !is_known || !wrong.is_empty() {
+                let text = format!("lap {lap}: {} {}", it.physics, wrong.join(" "));
+                texts.push(text.trim_end().to_owned());
+            }
+        }
+    }
     let text = if texts.is_empty() { "nothing".to_owned() } else { texts.join(", ") };
     Found::new(texts.is_empty(), text)
+}
+
+/// Sleepers of a hypothesis that belong to no structure of its kind.
+fn wrong_sleepers<'a>(accepted: &'a Accepted, all: &[Structure]) -> Vec<&'a str> {
+    let is_right = |id: &String| {
+        let mut alike = all.iter().filter(|of| of.physics == accepted.physics);
+        alike.any(|of| of.sleepers.contains(id))
+    };
+    accepted.sleepers.iter().filter(|id| !is_right(id)).map(String::as_str).collect()
 }
 
 #[cfg(test)]
@@ -179,5 +188,20 @@ mod tests {
         assert!(all.iter().all(|it| it.verdict == ClaimVerdict::Differs), "{all:#?}");
         assert_eq!(all[0].found, "lap 1: 4 of 4, lap 2: 0 of 4");
         assert_eq!(all[4].found, "lap 2: missing_railpad SN90, lap 2: squat");
+    }
+
+    #[test]
+    fn wrong_sleepers_beside_right_ones_are_listed() {
+        let mut study = study();
+        study.diagnoses.laps = vec![vec![
+            accepted("fastening_clamp", &["SN4", "SN5", "SN6"]),
+            accepted("rail_joint", &["SN12", "SN13"]),
+            accepted("missing_railpad", &[]),
+        ]];
+        let all = statements(&study);
+        // One clamp at its sleeper is enough to name clamps.
+        assert_eq!(all[2].verdict, ClaimVerdict::Reproduced, "{:?}", all[2]);
+        assert_eq!(all[4].verdict, ClaimVerdict::Differs, "{:?}", all[4]);
+        assert_eq!(all[4].found, "lap 1: fastening_clamp SN5 SN6");
     }
 }

@@ -137,6 +137,13 @@ pub fn correlation(pairs: &[(f64, f64)]) -> Option<f64> {
     correlation.is_finite().then_some(correlation)
 }
 
+/// Difference from zero, or of two correlation coefficients of so many pairs, that may be chance: two
+/// standard errors of `1 / sqrt(count)`.
+pub(crate) fn correlation_by_chance(count: usize) -> f64 {
+    const STANDARD_ERRORS: f64 = 2.0;
+    STANDARD_ERRORS / (count as f64).sqrt()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

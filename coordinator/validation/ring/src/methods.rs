@@ -1,8 +1,8 @@
 //! Methods beside each other (paper, section 5.1).
 
-use crate::estimates::{agree, correlation, median, sd_share};
+use crate::estimates::{agree, correlation, correlation_by_chance, median, sd_share};
 use crate::parameters::{ALONG, STIFFNESSES};
-use crate::statement::{Found, Statement, each, percent};
+use crate::statement::{Found, Statement, each, percent, sure};
 use crate::{Estimated, Method, Study};
 use tracktwin_number::rounded;
 use tracktwin_parameters::Parameter;
@@ -24,7 +24,11 @@ pub(crate) fn statements(study: &Study) -> Vec<Statement> {
             |label| format!("Gaussian processes and model selector agree about the {label}"),
             [
                 "the general trends are in good agreement",
-                "median difference at most a tenth of the range of Table D1",
+                &sure(
+                    "median difference at most a tenth of the range of Table D1, and a positive \
+                     correlation along the track; undecided if this is at most two standard errors (2 \
+                     over the root of the number of sleepers)",
+                ),
             ],
             |parameter| trend(study, [processes, selector], parameter),
         ));
@@ -45,7 +49,9 @@ pub(crate) fn statements(study: &Study) -> Vec<Statement> {
             |label| format!("Inversion and Gaussian processes agree about the {label}"),
             [
                 "-",
-                "difference inside its 90 % interval at 80 % of the sleepers that both call valid",
+                &sure(
+                    "difference inside its 90 % interval at 80 % of the sleepers that both call valid",
+                ),
             ],
             |parameter| agreement(study, [inversion, processes], parameter),
         ));
@@ -73,18 +79,28 @@ fn mismatch(study: &Study, selector: &Estimated) -> Option<Found> {
 }
 
 fn trend(study: &Study, [one, other]: [&Estimated; 2], parameter: Parameter) -> Option<Found> {
-    let pairs = study.truth.sleepers.iter().filter_map(|it| {
-        Some((one.any(&it.id, parameter)?.mean, other.any(&it.id, parameter)?.mean))
-    });
+    let sleepers = study.truth.sleepers.iter();
+    let pairs = sleepers
+        .filter_map(|it| Some([one.any(&it.id, parameter)?, other.any(&it.id, parameter)?]));
     let pairs: Vec<_> = pairs.collect();
+    let means: Vec<_> = pairs.iter().map(|[a, b]| (a.mean, b.mean)).collect();
     let [low, high] = parameter.range();
-    let difference = median(pairs.iter().map(|(a, b)| (a - b).abs() / (high - low)))?;
-    let along = correlation(&pairs).map_or_else(|| "-".to_owned(), |it| format!("{it:.2}"));
+    let difference = median(means.iter().map(|(a, b)| (a - b).abs() / (high - low)))?;
+    let along = correlation(&means);
     let text = format!(
-        "median difference {} of the range, correlation along the track {along}",
-        rounded(difference, 2)
+        "median difference {} of the range, correlation along the track {}",
+        rounded(difference, 2),
+        along.map_or_else(|| "-".to_owned(), |it| format!("{it:.2}"))
     );
-    Some(Found::new(difference <= DIFFERENCE, text))
+    let is_near = difference <= DIFFERENCE;
+    let by_chance = correlation_by_chance(pairs.len());
+    if is_near && along.is_none_or(|it| it.abs() <= by_chance) {
+        let text = format!("{text}; a correlation of {by_chance:.2} may be chance");
+        return Some(Found::undecided(text));
+    }
+    let is_alike = is_near && along.is_some_and(|it| it > 0.0);
+    let sds = pairs.iter().flatten().map(|it| sd_share(*it, parameter));
+    Some(Found::new(is_alike, text).if_sure(sds))
 }
 
 /// Whether two evaluations agree at enough of the sleepers that both call valid.
@@ -155,6 +171,27 @@ mod tests {
         };
         assert_eq!(with(0.02), ClaimVerdict::Reproduced);
         assert_eq!(with(0.0), ClaimVerdict::Differs);
+    }
+
+    #[test]
+    fn methods_agree_about_the_trend_only_if_they_are_sure_and_vary_alike() {
+        let study = study();
+        let parameter = Parameter::BallastStiffness;
+        let [low, high] = parameter.range();
+        let verdict = |slopes: [f64; 2], sd_share: f64| {
+            let [one, other] = slopes.map(|slope| {
+                estimated(&study, |sleeper, _, _| {
+                    let share = 0.5 + slope * (sleeper.number % 2) as f64;
+                    (low + share * (high - low), sd_share * (high - low))
+                })
+            });
+            let found = trend(&study, [&one, &other], parameter);
+            Statement::of(("Fig. 20", Method::GaussianProcesses), [""; 3], found).verdict
+        };
+        assert_eq!(verdict([0.03, 0.04], 0.05), ClaimVerdict::Reproduced);
+        assert_eq!(verdict([0.03, 0.04], 0.25), ClaimVerdict::CannotTell);
+        assert_eq!(verdict([0.03, -0.03], 0.05), ClaimVerdict::Differs);
+        assert_eq!(verdict([0.03, 0.0], 0.05), ClaimVerdict::CannotTell);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use crate::methods::{Tally, agreement};
 use crate::parameters::OWN;
-use crate::statement::{Found, Statement, each};
+use crate::statement::{Found, Statement, each, sure};
 use crate::{Method, Study};
 use tracktwin_parameters::Parameter;
 
@@ -18,7 +18,9 @@ pub(crate) fn statements(study: &Study) -> Vec<Statement> {
             |label| format!("Laps agree about the {label}"),
             [
                 "repeated measurements agree",
-                "difference of two laps inside its 90 % interval at 90 % of the valid sleepers",
+                &sure(
+                    "difference of two laps inside its 90 % interval at 90 % of the valid sleepers",
+                ),
             ],
             |parameter| laps(study, parameter),
         ));
@@ -32,7 +34,7 @@ pub(crate) fn statements(study: &Study) -> Vec<Statement> {
             |label| format!("{speed} and {fastest} km/h agree about the {label}"),
             [
                 "13 and 10 km/h agree; at 7 km/h stiffnesses deviate in places",
-                "difference inside its 90 % interval at 80 % of the valid sleepers",
+                &sure("difference inside its 90 % interval at 80 % of the valid sleepers"),
             ],
             |parameter| agreement(study, [by_speed, by_fastest], parameter),
         ));

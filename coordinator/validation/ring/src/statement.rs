@@ -38,6 +38,11 @@ impl Found {
         Self { text: text.into(), verdict }
     }
 
+    /// A finding that does not decide the statement.
+    pub(crate) fn undecided(text: impl Into<String>) -> Self {
+        Self { text: text.into(), verdict: ClaimVerdict::CannotTell }
+    }
+
     /// The same, undecided where estimates agree that are not sure; `sds` are their standard
     /// deviations as shares of the parameter's range.
     pub(crate) fn if_sure(mut self, sds: impl IntoIterator<Item = f64>) -> Self {
@@ -88,6 +93,14 @@ pub(crate) fn each(
         Statement::of(source, [&claim, expected, tolerance], found(parameter))
     };
     parameters.iter().map(of).collect()
+}
+
+/// A tolerance together with the limit of [`Found::if_sure`].
+pub(crate) fn sure(tolerance: &str) -> String {
+    format!(
+        "{tolerance}; undecided if the median standard deviation is above {} of the range",
+        percent(SURE)
+    )
 }
 
 /// A share in per cent, `87 %`.

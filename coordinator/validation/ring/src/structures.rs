@@ -1,7 +1,7 @@
 //! Statements about clamps, the missing railpad, gaps and bolts (paper, sections 5.1 to 5.3).
 
-use crate::estimates::{mean, median};
-use crate::statement::{Found, Statement, percent};
+use crate::estimates::{mean, median, sd_share};
+use crate::statement::{Found, Statement, percent, sure};
 use crate::{Estimated, Method, SleeperTruth, Study};
 use tracktwin_number::rounded;
 use tracktwin_parameters::Parameter;
@@ -30,7 +30,7 @@ pub(crate) fn statements(study: &Study, method: Method, estimated: &Estimated) -
             [
                 "Bolts raise the sleeper bending stiffness",
                 "about 5000 N m2, more than twice the nominal 2300 N m2 (here 2362 N m2)",
-                "median at least twice the truth",
+                &sure("median at least twice the truth"),
             ],
             bending(study, estimated),
         ));
@@ -81,7 +81,8 @@ fn bending(study: &Study, estimated: &Estimated) -> Option<Found> {
         rounded(sd, 2),
         rounded(ratio, 3)
     );
-    Some(Found::new(ratio >= RAISED, text))
+    let sds = found.iter().map(|(_, of)| sd_share(*of, parameter));
+    Some(Found::new(ratio >= RAISED, text).if_sure(sds))
 }
 
 fn railpad(estimated: &Estimated, sleeper: &SleeperTruth) -> Option<f64> {
@@ -201,6 +202,20 @@ mod tests {
         assert_eq!(verdicts, [no, yes, yes, yes], "{all:#?}");
         assert!(all[2].found.starts_with("lowest at SN91"), "{}", all[2].found);
         assert!(all[3].found.starts_with("6 of 6"), "{}", all[3].found);
+    }
+
+    #[test]
+    fn the_middle_of_the_range_does_not_show_that_bolts_raise_the_bending_stiffness() {
+        let study = study();
+        let verdict = |sd_share: f64| {
+            let middle = estimated(&study, |_, parameter, _| {
+                let [low, high] = parameter.range();
+                (0.5 * (low + high), sd_share * (high - low))
+            });
+            statements(&study, Method::GaussianProcesses, &middle)[0].verdict
+        };
+        assert_eq!(verdict(0.05), ClaimVerdict::Reproduced);
+        assert_eq!(verdict(0.25), ClaimVerdict::CannotTell);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::file::{File, SleeperTable};
 use super::{TRACK_FORMAT, TrackError};
 use crate::quantity::SPEED;
-use crate::{DesignNumber, Parameter};
+use crate::{DesignNumber, Parameter, check_wavelengths};
 
 impl File {
     pub(super) fn check(&self) -> Result<(), TrackError> {
@@ -42,15 +42,9 @@ impl File {
                 ),
             });
         }
-        let [shortest, longest] = self.surface.wavelengths_m;
-        if !(shortest > 0.0 && shortest < longest && longest.is_finite()) {
-            return Err(TrackError::Inconsistent {
-                key: "surface.wavelengths_m",
-                message: format!(
-                    "[{shortest}, {longest}] must be two positive lengths in m, the shorter first"
-                ),
-            });
-        }
+        check_wavelengths(self.surface.wavelengths_m).map_err(|error| {
+            TrackError::Inconsistent { key: "surface.wavelengths_m", message: error.to_string() }
+        })?;
         let speeds = &self.measurement.speeds_km_h;
         let ascending = speeds.windows(2).all(|pair| pair[0] < pair[1]);
         let [slowest, fastest] = SPEED.range;

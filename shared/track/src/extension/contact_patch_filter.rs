@@ -22,27 +22,33 @@ pub(super) const KIND: Kind = Kind {
         "the baseline fits the spectrum of the surface, and a patch changes nothing else",
     ),
     build: |inputs| {
-        Ok(Arc::new(ContactPatchFilter { half_length_m: inputs.value("half_length_m") }))
+        let patch = ContactPatch { half_length_m: inputs.value("half_length_m") };
+        let of_design =
+            inputs.design.contact_patch_filter.then(|| ContactPatch::new(inputs.design));
+        Ok(Arc::new(ContactPatchFilter { patch, of_design }))
     },
 };
 
-/// A contact patch whose length differs from that of the design. The patch filters the random
+/// A contact patch in place of that of the design, if the design has one. The patch filters the random
 /// irregularity only, not the profiles that other kinds add to the surface.
 #[derive(Debug)]
 struct ContactPatchFilter {
-    half_length_m: f64,
+    patch: ContactPatch,
+    of_design: Option<ContactPatch>,
 }
 
 impl Extension for ContactPatchFilter {
     fn roughness_gain(&self, wave_number_rad_m: f64) -> f64 {
-        ContactPatch { half_length_m: self.half_length_m }.gain(wave_number_rad_m)
+        let replaced = self.of_design.map_or(1.0, |patch| patch.gain(wave_number_rad_m));
+        self.patch.gain(wave_number_rad_m) / replaced
     }
 }
 
 #[cfg(test)]
 mod tests {
     use crate::extension::testing::{extension, instance, track};
-    use crate::model::{Roughness, Surface};
+    use crate::model::{ContactPatch, Roughness, Surface};
+    use tracktwin_parameters::TrackDesign;
 
     #[test]
     fn waves_much_longer_than_the_patch_pass_and_short_ones_do_not() {
@@ -53,6 +59,15 @@ mod tests {
         // Far above, eight times less for an octave.
         let octave = filter.roughness_gain(1e5) / filter.roughness_gain(2e5);
         assert!((octave - 8.0).abs() < 1e-4, "{octave}");
+    }
+
+    #[test]
+    fn a_patch_replaces_that_of_the_design() {
+        let design = TrackDesign { contact_patch_filter: true, ..TrackDesign::v_track() };
+        let own_m = ContactPatch::new(&design).half_length_m;
+        let same = instance("contact_patch_filter").with("half_length_m", own_m);
+        let same = same.build(&design, 12).unwrap();
+        assert!((same.roughness_gain(1e3) - 1.0).abs() < 1e-12);
     }
 
     #[test]

@@ -111,7 +111,7 @@ mod tests {
     };
     use crate::model::{ContactPatch, Mesh, Support, TrackModel};
     use std::f64::consts::TAU;
-    use tracktwin_parameters::Preset;
+    use tracktwin_parameters::{Preset, TrackDesign};
 
     /// Mean square of the profile from 0.7 m to 0.9 m.
     fn mean_square(bandwidth: f64) -> f64 {
@@ -119,6 +119,14 @@ mod tests {
         let waves = extension(&waves.with("wavelength_m", 2e-3).with("amplitude_m", 1e-6));
         let height = |point: u32| waves.profile_m(0.7 + 1e-5 * f64::from(point));
         (0..20_000).map(|point| height(point).powi(2)).sum::<f64>() / 20_000.0
+    }
+
+    #[test]
+    fn waves_at_a_point_are_refused() {
+        let waves = instance("corrugation").at([0.5, 0.5]).with("wavelength_m", 2e-3);
+        let refusal = waves.with("amplitude_m", 1e-6).build(&TrackDesign::v_track(), 12);
+        let message = refusal.err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(message.contains("a stretch of the rail"), "{message}");
     }
 
     #[test]

@@ -62,6 +62,10 @@ struct HangingSleeper {
 }
 
 impl Extension for HangingSleeper {
+    fn replaces_support(&self) -> bool {
+        true
+    }
+
     fn assemble(&self, assembly: &mut Assembly) {
         for &index in &self.sleepers {
             let place_m = assembly.layout().sleepers()[index].position_m;

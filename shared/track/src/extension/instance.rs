@@ -254,7 +254,7 @@ impl Inputs<'_> {
             PlaceKind::Nowhere => x_m.is_none() && sleepers.is_none(),
             // A diagnosis may say beside the point which sleepers are near it.
             PlaceKind::Point => x_m.is_some_and(|[from, to]| from == to && on_track([from, to])),
-            PlaceKind::Stretch => x_m.is_none_or(on_track),
+            PlaceKind::Stretch => x_m.is_none_or(|[from, to]| from < to && on_track([from, to])),
             PlaceKind::Sleepers => sleepers.is_none_or(standing),
         };
         if fits {

@@ -53,6 +53,10 @@ struct LoadDependentRailpad {
 }
 
 impl Extension for LoadDependentRailpad {
+    fn replaces_support(&self) -> bool {
+        true
+    }
+
     fn assemble(&self, assembly: &mut Assembly) {
         for &index in &self.sleepers {
             let stiffness = assembly.supports()[index].railpad_stiffness;

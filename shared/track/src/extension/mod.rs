@@ -63,6 +63,12 @@ pub trait Extension: Debug + Send + Sync {
     /// Adds its linear terms, degrees of freedom and force laws to the track being assembled.
     fn assemble(&self, _assembly: &mut Assembly) {}
 
+    /// Whether it replaces a railpad or ballast by a force law. It is then added after all others, which change the
+    /// values that it replaces.
+    fn replaces_support(&self) -> bool {
+        false
+    }
+
     /// Changes the vehicle.
     fn equip(&self, _vehicle: &mut Vehicle) {}
 

@@ -89,11 +89,15 @@ impl SampledExtension {
         present.then_some(instance)
     }
 
-    /// Checks that the extension can be built at both ends of all ranges on a track of this design.
+    /// The extension at the low and at the high end of all its ranges, on a track of this design.
     ///
     /// # Errors
     /// [`InstanceError`] names the invalid kind, share, parameter or place.
-    pub fn check(&self, design: &TrackDesign, spans: usize) -> Result<(), InstanceError> {
+    pub fn checked(
+        &self,
+        design: &TrackDesign,
+        spans: usize,
+    ) -> Result<[Arc<dyn Extension>; 2], InstanceError> {
         if !(0.0..=1.0).contains(&self.share) {
             return Err(InstanceError::Value {
                 physics: self.physics.clone(),
@@ -117,7 +121,7 @@ impl SampledExtension {
             instance.check_numbers()?;
             instance.build(design, spans)
         };
-        built(0.0).and_then(|_| built(1.0)).map(|_| ())
+        Ok([built(0.0)?, built(1.0)?])
     }
 
     /// The extension with every value at the relative position in its range that `unit` returns.
@@ -169,11 +173,11 @@ mod tests {
         let json = serde_json::to_string(&voids(0.5)).unwrap();
         assert_eq!(serde_json::from_str::<SampledExtension>(&json).unwrap(), voids(0.5));
         let design = TrackDesign::v_track();
-        voids(0.5).check(&design, 12).unwrap();
-        assert!(voids(1.5).check(&design, 12).unwrap_err().to_string().contains("share is 1.5"));
+        voids(0.5).checked(&design, 12).unwrap();
+        assert!(voids(1.5).checked(&design, 12).unwrap_err().to_string().contains("share is 1.5"));
         let mut negative = voids(0.5);
         negative.parameters.insert("gap_m".to_owned(), SampledValue::Between([-1e-5, 1e-4]));
-        let refusal = negative.check(&design, 12).unwrap_err().to_string();
+        let refusal = negative.checked(&design, 12).unwrap_err().to_string();
         assert!(refusal.contains("gap_m: -1e-5 m is not a valid gap"), "{refusal}");
         // Both ends can be built; what lies between is no number, or is drawn from the wrong end.
         for (low, high) in [(-3.0, 3.0), (3.0, 1.0)] {
@@ -182,12 +186,12 @@ mod tests {
             rough.physics = "roughness_spectrum".to_owned();
             rough.sleepers = None;
             rough.parameters = BTreeMap::from([("slope_dB_per_octave".to_owned(), slope)]);
-            let refusal = rough.check(&design, 12).unwrap_err().to_string();
+            let refusal = rough.checked(&design, 12).unwrap_err().to_string();
             assert!(refusal.contains("slope_dB_per_octave is"), "{refusal}");
         }
         let mut twice = voids(0.5);
         twice.sleepers = Some(vec![5, 5]);
-        let refusal = twice.check(&design, 12).unwrap_err().to_string();
+        let refusal = twice.checked(&design, 12).unwrap_err().to_string();
         assert!(refusal.contains("ascending"), "{refusal}");
     }
 }

@@ -70,10 +70,7 @@ impl Extension for SubgradeLayer {
             let layer = assembly.append_dof();
             assembly.add_mass(&layer, self.mass_kg);
             assembly.add_spring_damper(&layer, self.ground);
-            for (port, ballast) in assembly.ballast(index) {
-                assembly.add_spring_damper(&port, ballast.share(-1.0));
-                assembly.add_spring_damper(&port.minus(&layer), ballast);
-            }
+            assembly.stand_ballast_on(index, layer);
         }
     }
 }
@@ -100,6 +97,30 @@ mod tests {
         let without = direct_receptance(&track(&[]), ReceptancePoint::Rail(0.8));
         // The ballast is a thousand-millionth of the layer's stiffness.
         assert!(relative_distance(&with, &without) < 1e-6);
+    }
+
+    #[test]
+    fn the_order_of_extensions_on_one_sleeper_does_not_matter() {
+        let gap = instance("hanging_sleeper").on([5]).with("gap_m", 1.0);
+        let pads = instance("load_dependent_railpad").with("exponent", 0.4);
+        let soft = instance("missing_railpad").on([5]).with("stiffness_N_per_m", 1e7);
+        for [one, other] in [[layer(3.0, 6e7), gap], [pads, soft]] {
+            let felt = |order: &[ExtensionInstance]| {
+                direct_receptance(&track(order), ReceptancePoint::Rail(0.75))
+            };
+            let [there, back] = [felt(&[one.clone(), other.clone()]), felt(&[other.clone(), one])];
+            assert!(relative_distance(&there, &back) < 1e-9, "{other:?}");
+        }
+    }
+
+    #[test]
+    fn an_open_gap_over_a_layer_leaves_nothing_to_the_ground() {
+        let gap = instance("hanging_sleeper").on([5]).with("gap_m", 1.0);
+        let gap = gap.with("damping_share", 0.0);
+        let felt =
+            |of: &[ExtensionInstance]| direct_receptance(&track(of), ReceptancePoint::Rail(0.75));
+        let over_layer = felt(&[layer(3.0, 6e7).on([5]), gap.clone()]);
+        assert!(relative_distance(&over_layer, &felt(&[gap])) < 1e-9);
     }
 
     #[test]

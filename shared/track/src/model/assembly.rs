@@ -47,6 +47,8 @@ pub struct Assembly {
     supports: Vec<Support>,
     /// Bending flexibility of softened sleeper elements over that of their sleeper, by sleeper and element.
     softened: BTreeMap<(usize, usize), f64>,
+    /// What the ballast of a sleeper stands on, if it is not the ground, by sleeper.
+    under_ballast: BTreeMap<usize, Port>,
     terms: Vec<Term>,
     dofs: usize,
     force_laws: Vec<ForceLaw>,
@@ -68,16 +70,17 @@ impl Assembly {
             layout,
             supports: supports.to_vec(),
             softened: BTreeMap::new(),
+            under_ballast: BTreeMap::new(),
             terms: Vec::new(),
             dofs,
             force_laws: Vec::new(),
         };
         assembly.add_rail();
-        for (index, support) in supports.iter().enumerate() {
+        for index in 0..supports.len() {
             for element in 0..assembly.layout.sleepers()[index].tip_node() {
                 assembly.add_sleeper_element(index, element, 1.0);
             }
-            assembly.add_support(index, support, 1.0);
+            assembly.add_support(index, 1.0);
         }
         assembly
     }
@@ -102,11 +105,10 @@ impl Assembly {
     /// # Panics
     /// When the track has no such sleeper.
     pub fn set_support(&mut self, index: usize, support: Support) {
-        let before = self.supports[index];
-        self.add_support(index, &before, -1.0);
-        self.add_support(index, &support, 1.0);
-        let sleeper_bending_stiffness = before.sleeper_bending_stiffness;
+        let sleeper_bending_stiffness = self.supports[index].sleeper_bending_stiffness;
+        self.add_support(index, -1.0);
         self.supports[index] = Support { sleeper_bending_stiffness, ..support };
+        self.add_support(index, 1.0);
     }
 
     /// Ports of the ballast under sleeper `index` (from 0), and the spring and damper on each.
@@ -116,9 +118,25 @@ impl Assembly {
     pub fn ballast(&self, index: usize) -> Vec<(Port, SpringDamper)> {
         let ballast = self.supports[index].ballast();
         let shares = self.layout.sleepers()[index].tributary_shares();
-        let port = |node| self.layout.sleeper_port(index, node);
+        let port = |node| {
+            let sleeper = self.layout.sleeper_port(index, node);
+            match self.under_ballast.get(&index) {
+                Some(base) => sleeper.minus(base),
+                None => sleeper,
+            }
+        };
         let of = |(node, share)| (port(node), ballast.share(share));
         shares.into_iter().enumerate().map(of).collect()
+    }
+
+    /// Lets the ballast of sleeper `index` (from 0) stand on a port instead of the ground.
+    ///
+    /// # Panics
+    /// When the track has no such sleeper.
+    pub fn stand_ballast_on(&mut self, index: usize, base: Port) {
+        self.add_ballast(index, -1.0);
+        self.under_ballast.insert(index, base);
+        self.add_ballast(index, 1.0);
     }
 
     /// Multiplies the bending stiffness of the rail by `factor` between two places in m.
@@ -224,14 +242,17 @@ impl Assembly {
         self.add_beam(&beam, dofs, 0.0, factor);
     }
 
-    /// Adds railpad and ballast, `factor` times.
-    fn add_support(&mut self, index: usize, support: &Support, factor: f64) {
-        let railpad = support.railpad().share(factor);
+    /// Adds railpad and ballast with their present values, `factor` times.
+    fn add_support(&mut self, index: usize, factor: f64) {
+        let railpad = self.supports[index].railpad().share(factor);
         self.add_spring_damper(&self.layout.railpad_port(index), railpad);
-        let shares = self.layout.sleepers()[index].tributary_shares();
-        for (node, share) in shares.into_iter().enumerate() {
-            let port = self.layout.sleeper_port(index, node);
-            self.add_spring_damper(&port, support.ballast().share(share).share(factor));
+        self.add_ballast(index, factor);
+    }
+
+    /// Adds the ballast with its present values, `factor` times.
+    fn add_ballast(&mut self, index: usize, factor: f64) {
+        for (port, ballast) in self.ballast(index) {
+            self.add_spring_damper(&port, ballast.share(factor));
         }
     }
 

@@ -68,7 +68,8 @@ pub enum ModelError {
 }
 
 impl TrackModel {
-    /// Assembles the track from one support per sleeper, then adds the extensions in their order.
+    /// Assembles the track from one support per sleeper, then adds the extensions in their order. Those that replace a
+    /// support by a force law come last.
     ///
     /// # Errors
     /// [`ModelError`] names the invalid input.
@@ -81,8 +82,12 @@ impl TrackModel {
         check(design, mesh, supports)?;
         let mut assembly = Assembly::new(design, Layout::new(design, mesh), supports);
         let mut vehicle = Vehicle::rigid(&design.wheel);
+        for replaces in [false, true] {
+            for extension in extensions.iter().filter(|it| it.replaces_support() == replaces) {
+                extension.assemble(&mut assembly);
+            }
+        }
         for extension in extensions {
-            extension.assemble(&mut assembly);
             extension.equip(&mut vehicle);
         }
         let Assembled { layout, matrices, force_laws } = assembly.finish();

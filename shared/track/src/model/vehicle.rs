@@ -43,7 +43,7 @@ impl ContactOscillator {
 
 impl Vehicle {
     /// A rigid wheel and the design's further ones.
-    pub(super) fn rigid(wheel: &Wheel) -> Self {
+    pub fn rigid(wheel: &Wheel) -> Self {
         let further_wheels_m = wheel.further_wheels_m.clone();
         Self { wheel: wheel.clone(), oscillators: Vec::new(), further_wheels_m }
     }
