@@ -35,7 +35,7 @@ pub fn hammer_page(
         h2 { "Along the track" }
         (figure(&charts(record, loaded.map(|it| it.0)), "Estimate at every sleeper with its 90 % interval (paper, Fig. 23). Hollow dots: not valid, the track model does not explain the receptances. Dashed grey: evaluation of a recording, under the load of the wheel."))
         h2 { "Estimates" }
-        p.note { "Estimate with its 90 % interval. In brackets: the test does not tell the value, the interval is more than half as wide as before the test. Mean of all: the test does not tell this sleeper apart, the value is the mean of all sleepers. Rows in italics are not valid. Misfit: mean square of the residuals over its expectation. Railpad stiffness is that without the load of a wheel." }
+        p.note { "Estimate with its 90 % interval. In brackets: the test does not tell the value, the interval is more than half as wide as before the test. Mean of all: the test does not tell this sleeper apart, the value is close to the mean of all sleepers. Rows in italics are not valid. Misfit: mean square of the residuals over its expectation. Railpad stiffness is that without the load of a wheel." }
         div.scroll { (table(record)) }
         h2 { "Provenance" }
         (provenance(record, loaded.map(|it| it.0), command))
@@ -93,10 +93,7 @@ fn chart(record: &HammerRecord, loaded: Option<&Loaded>, parameter: Parameter) -
         ..*it
     };
     let own = |sleeper: &Sleeper| (sleeper.x_m, scaled(&sleeper.estimates[&parameter]));
-    let valid: Vec<Vec<_>> = valid_stretches(&record.sleepers, Sleeper::is_valid)
-        .into_iter()
-        .map(|stretch| stretch.iter().map(own).collect())
-        .collect();
+    let valid = valid_stretches(&record.sleepers, |it| it.is_valid().then(|| own(it)));
     let invalid = record.sleepers.iter().filter(|sleeper| !sleeper.is_valid());
     let invalid: Vec<_> = invalid.map(own).collect();
     let places = || record.sleepers.iter().map(|sleeper| sleeper.x_m);
@@ -108,10 +105,7 @@ fn chart(record: &HammerRecord, loaded: Option<&Loaded>, parameter: Parameter) -
         (first..=last).contains(&sleeper.x_m).then_some((sleeper.x_m, mean, half))
     };
     let loaded = loaded.map_or(&[][..], |loaded| &loaded.sleepers);
-    let behind: Vec<Vec<_>> = valid_stretches(loaded, |it: &LoadedSleeper| beside(it).is_some())
-        .into_iter()
-        .map(|stretch| stretch.iter().filter_map(beside).collect())
-        .collect();
+    let behind = valid_stretches(loaded, beside);
     let ends = valid.iter().flatten().flat_map(|(_, it)| [it.lower, it.upper]);
     let compared = behind.iter().flatten();
     let ends = ends.chain(compared.flat_map(|&(_, mean, half)| [mean - half, mean + half]));

@@ -111,19 +111,15 @@ fn chart(inversion: &Inversion, models: Option<&Evaluation>, parameter: Paramete
         Some((x_m, mean / shown.divisor, 2.0 * sd / shown.divisor))
     };
     let own = |it: &Sleeper| point(it.x_m, &it.estimates);
-    let valid: Vec<Vec<_>> = valid_stretches(&inversion.sleepers, Sleeper::is_valid)
-        .into_iter()
-        .map(|stretch| stretch.iter().filter_map(own).collect())
-        .collect();
+    let valid = valid_stretches(&inversion.sleepers, |it| own(it).filter(|_| it.is_valid()));
     let invalid = inversion.sleepers.iter().filter(|sleeper| !sleeper.is_valid());
     let invalid: Vec<_> = invalid.filter_map(own).collect();
     let is_evaluated = |id: &str| inversion.sleepers.iter().any(|sleeper| sleeper.id == id);
     let beside = models.map_or(&[][..], |models| &models.sleepers);
-    let behind: Vec<Vec<_>> =
-        valid_stretches(beside, |it: &SleeperEvaluation| it.is_valid() && is_evaluated(&it.id))
-            .into_iter()
-            .map(|stretch| stretch.iter().filter_map(|it| point(it.x_m, &it.estimates)).collect())
-            .collect();
+    let behind = valid_stretches(beside, |it: &SleeperEvaluation| {
+        let is_drawn = it.is_valid() && is_evaluated(&it.id);
+        point(it.x_m, &it.estimates).filter(|_| is_drawn)
+    });
     let drawn = || valid.iter().chain(&behind).flatten();
     let ends = drawn().flat_map(|&(_, mean, two)| [mean - two, mean + two]);
     let ends = ends.chain(invalid.iter().map(|p| p.1)).map(|end| end.max(0.0));

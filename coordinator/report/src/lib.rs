@@ -39,11 +39,12 @@ fn capital(text: &str) -> String {
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// Neighbouring items for which `is_valid` holds, stretch by stretch. A line through each stretch does not
-/// cross the items between them.
-fn valid_stretches<T>(items: &[T], is_valid: impl Fn(&T) -> bool) -> Vec<&[T]> {
-    let alike = items.chunk_by(|a, b| is_valid(a) == is_valid(b));
-    alike.filter(|stretch| is_valid(&stretch[0])).collect()
+/// Points of neighbouring items, stretch by stretch; an item without a point ends a stretch. A line through each
+/// stretch does not cross the items between them.
+fn valid_stretches<T, P: Clone>(items: &[T], point: impl Fn(&T) -> Option<P>) -> Vec<Vec<P>> {
+    let points: Vec<Option<P>> = items.iter().map(point).collect();
+    let stretches = points.split(Option::is_none).filter(|stretch| !stretch.is_empty());
+    stretches.map(|stretch| stretch.iter().flatten().cloned().collect()).collect()
 }
 
 /// Lowest and highest of ascending frequencies.

@@ -76,9 +76,8 @@ struct ChartEstimate {
 fn draw(chart: &mut Chart, process: &[ChartEstimate], selector: &[ChartEstimate], range: [f64; 2]) {
     // The models know nothing beyond the library's range.
     let within = |value: f64| value.clamp(range[0], range[1]);
-    let stretches = |of: &[ChartEstimate]| -> Vec<Vec<(f64, f64, f64)>> {
-        let valid = valid_stretches(of, |estimate| estimate.valid).into_iter();
-        valid.map(|it| it.iter().map(|p| (p.x_m, p.mean, p.two_sd)).collect()).collect()
+    let stretches = |of: &[ChartEstimate]| {
+        valid_stretches(of, |it| it.valid.then_some((it.x_m, it.mean, it.two_sd)))
     };
     let points = |of: &[(f64, f64, f64)]| of.iter().map(|p| (p.0, p.1)).collect::<Vec<_>>();
     for stretch in stretches(process) {

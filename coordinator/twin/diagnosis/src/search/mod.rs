@@ -273,12 +273,7 @@ impl SearchOutcome {
         let known: Vec<(Candidate, f64)> =
             best.map(|fitted| (fitted.candidate.clone(), fitted.log_evidence)).collect();
         let detected_shapes_m = &setting.prepared.detected_shapes_m;
-        let threshold = EvidenceThreshold {
-            accepted: &known,
-            section: &forward.section,
-            detected_shapes_m,
-            excess: 1.0,
-        };
+        let threshold = EvidenceThreshold::new(&known, &forward.section, detected_shapes_m);
         let hopeless = self.rounds.last().map_or(Vec::new(), Round::hopeless);
         let (mut round, mut ports) =
             setting.round(&problem, &self.last, all, threshold, &hopeless, progress)?;
@@ -295,12 +290,9 @@ impl SearchOutcome {
                 setting.round(&problem, &self.last, all, threshold, &hopeless, progress)?;
         }
         let competitor = self.competing_unknown(&round, &ports, &forward.section);
-        if let Some(best) = accepted_candidate(
-            &round,
-            competitor.as_ref(),
-            setting.prepared,
-            threshold.with_excess(round.excess),
-        ) {
+        if let Some(best) =
+            accepted_candidate(&round, competitor.as_ref(), setting.prepared, threshold)
+        {
             progress(Stage::HeldOut, 0.0);
             round.held_out_gain =
                 self.accept_if_predictive(best, &round.fitted, setting, densities)?;

@@ -234,6 +234,7 @@ pub(super) fn accepted_candidate<'r>(
     let probabilities = round.against(competitor);
     let Probabilities { group, unknown, .. } = probabilities;
     let best = round.fitted.first()?;
+    let threshold = threshold.with_excess(round.excess);
     let is_shape = || {
         competitor
             .is_some_and(|competitor| is_shape_at(&competitor.place, &best.candidate, prepared))

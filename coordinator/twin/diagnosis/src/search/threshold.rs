@@ -5,7 +5,7 @@ use super::extent::Extent;
 use super::probability::EVIDENCE_TEMPERING;
 use crate::candidate::Candidate;
 use crate::section::Section;
-use tracktwin_track::extension::Class;
+use tracktwin_track::extension::{Class, PlaceKind};
 
 /// Smallest ratio of a candidate's log evidence to the part of an accepted one's that belongs to its
 /// location. A model error looks like a small second effect there, except for an effect without a location
@@ -36,19 +36,29 @@ pub(super) struct EvidenceThreshold<'a> {
     pub(super) excess: f64,
 }
 
-impl EvidenceThreshold<'_> {
+impl<'a> EvidenceThreshold<'a> {
+    /// Thresholds beside these accepted candidates, which leave the residual of null simulations.
+    pub(super) const fn new(
+        accepted: &'a [(Candidate, f64)],
+        section: &'a Section,
+        detected_shapes_m: &'a [[f64; 2]],
+    ) -> Self {
+        Self { accepted, section, detected_shapes_m, excess: 1.0 }
+    }
+
     /// The smallest log evidence of this candidate in nats.
     ///
     /// A shape that the inspection detected away from all accepted candidates is no residual of another
     /// effect and needs only the evidence of a first candidate. So does an effect at one or two sleepers beside
-    /// one without a location, whose model error is the same at all sleepers; their residual tells its size.
+    /// one that has no place on the track, such as an axle box: its model error is the same at all sleepers, and
+    /// their residual tells its size. Bolts everywhere have a place at each sleeper, where one may be missing.
     pub(super) fn of(self, candidate: &Candidate) -> f64 {
         let alone = first_evidence();
         if is_local_shape(candidate) && self.is_detected_by_passes(candidate) {
             return alone;
         }
         let beside = self.accepted.iter().map(|(known, evidence)| {
-            if known.is_everywhere() && is_at_few_sleepers(candidate) {
+            if known.kind.place == PlaceKind::Nowhere && is_at_few_sleepers(candidate) {
                 self.excess * alone
             } else {
                 self.share(known, candidate) * evidence
@@ -129,7 +139,7 @@ mod tests {
         let (squat, gap) = (named("squat"), named("hanging_sleeper"));
         let [x_m, _] = squat.extension.x_m.unwrap();
         let is_random = |section: &Section, detected_shapes_m: &[[f64; 2]], candidate, evidence| {
-            EvidenceThreshold { accepted: &[], section, detected_shapes_m, excess: 1.0 }
+            EvidenceThreshold::new(&[], section, detected_shapes_m)
                 .is_random_surface(candidate, evidence)
         };
         assert!(is_random(&line, &[], squat, 24.0));
@@ -158,12 +168,7 @@ mod tests {
             };
             all.iter().find(is_it).unwrap()
         };
-        let threshold = EvidenceThreshold {
-            accepted: &[],
-            section: &section,
-            detected_shapes_m: &[],
-            excess: 1.0,
-        };
+        let threshold = EvidenceThreshold::new(&[], &section, &[]);
         let (bolts, axle_box) = (of("sleeper_bolt", None), of("flexible_axle_box", None));
         let (gap, far) = (of("hanging_sleeper", Some(&[3])), of("sleeper_bolt", Some(&[20])));
         let near = of("missing_railpad", Some(&[4]));
@@ -181,6 +186,9 @@ mod tests {
         assert_eq!(beside.of(gap), first_evidence());
         assert_eq!(beside.with_excess(4.0).of(gap), 4.0 * first_evidence());
         assert_eq!(beside.of(bolts), 0.25 * 9000.0);
+        let known = [(bolts.clone(), 9000.0)];
+        let beside = EvidenceThreshold { accepted: &known, ..threshold };
+        assert_eq!(beside.of(gap), 0.25 * 4.0 / 27.0 * 9000.0);
 
         let joint_m = joint_at(10.0).extension.x_m.unwrap();
         let shown = EvidenceThreshold { detected_shapes_m: &[joint_m], ..threshold };
