@@ -59,12 +59,15 @@ impl Extensions {
     }
 }
 
-/// All kinds with their parameters.
-pub(in crate::commands) fn list() -> String {
+/// All kinds with their parameters, on a track whose lengths are `length_ratio` times those of V-Track.
+pub(in crate::commands) fn list(length_ratio: f64) -> String {
     let parameter = |parameter: &KindParameter| {
-        let given = match parameter.default {
-            Some(value) => format!("default {value}"),
-            None => format!("required, e.g. {:e}", parameter.typical),
+        let given = match parameter.default_at(length_ratio) {
+            Some(value) => format!("default {}", rounded(value)),
+            None => {
+                let typical = parameter.scaled(parameter.typical, length_ratio);
+                format!("required, e.g. {:e}", rounded(typical))
+            }
         };
         format!("\n  {}: {}; {given}", parameter.name, parameter.meaning)
     };
@@ -76,10 +79,12 @@ pub(in crate::commands) fn list() -> String {
     Kind::all().map(kind).collect::<Vec<_>>().join("\n")
 }
 
-/// All kinds with their parameters, as JSON.
-pub(in crate::commands) fn list_json() -> Value {
+/// The same as [`list`], as JSON.
+pub(in crate::commands) fn list_json(length_ratio: f64) -> Value {
     let parameter = |parameter: &KindParameter| {
-        let KindParameter { name, unit, meaning, typical, default, .. } = parameter;
+        let KindParameter { name, unit, meaning, typical, .. } = parameter;
+        let typical = parameter.scaled(*typical, length_ratio);
+        let default = parameter.default_at(length_ratio);
         json!({
             "name": name, "unit": unit, "meaning": meaning, "typical": typical, "default": default,
         })
@@ -92,4 +97,9 @@ pub(in crate::commands) fn list_json() -> Value {
         })
     };
     Kind::all().map(kind).collect()
+}
+
+/// The value with two significant digits, for people.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.1e}").parse().unwrap_or(value)
 }

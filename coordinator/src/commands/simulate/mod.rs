@@ -100,7 +100,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     if arguments.extensions.asks_for_list() {
-        print_list(arguments.json);
+        print_list(arguments)?;
         return Ok(());
     }
     let Some(out) = &arguments.out else {
@@ -138,13 +138,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     Ok(())
 }
 
-/// Prints all kinds of extensions.
-fn print_list(json: bool) {
-    if json {
-        print_json(&extensions::list_json());
+/// Prints all kinds of extensions with the values of the chosen track.
+fn print_list(arguments: &Arguments) -> Result<(), Stop> {
+    let length_ratio = arguments.track.track()?.design.length_ratio();
+    if arguments.json {
+        print_json(&extensions::list_json(length_ratio));
     } else {
-        println_stdout(&extensions::list());
+        println_stdout(&extensions::list(length_ratio));
     }
+    Ok(())
 }
 
 /// The path of the recording and the contact loss of its passes.

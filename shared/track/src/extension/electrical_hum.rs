@@ -17,7 +17,7 @@ pub(super) const KIND: Kind = Kind {
     measuring_chain: true,
     parameters: &[
         KindParameter::new("frequency_Hz", "Hz", "frequency of the tone")
-            .ranges([50.0, 1000.0], [16.7, 1000.0], 50.0)
+            .ranges([16.7, 1000.0], [16.7, 1000.0], 50.0)
             .or(50.0),
         KindParameter::new("amplitude_m_s2", "m/s2", "amplitude of the tone").ranges(
             [0.05, 5.0],

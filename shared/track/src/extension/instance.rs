@@ -51,7 +51,7 @@ pub enum InstanceError {
         parameter: &'static str,
         /// Meaning of the parameter.
         meaning: &'static str,
-        /// Typical value on V-Track.
+        /// Typical value on a track of this scale.
         typical: f64,
     },
     /// The value of a parameter is not allowed.
@@ -174,9 +174,11 @@ impl ExtensionInstance {
 }
 
 impl Inputs<'_> {
-    /// The value of a parameter of the kind: the given value, otherwise the default.
+    /// The value of a parameter of the kind: the given value, otherwise the default at the track's scale.
     pub fn value(&self, name: &str) -> f64 {
-        let default = self.kind.parameter(name).and_then(|parameter| parameter.default);
+        let length_ratio = self.design.length_ratio();
+        let default =
+            self.kind.parameter(name).and_then(|parameter| parameter.default_at(length_ratio));
         let given = self.instance.parameters.get(name).copied();
         given.or(default).expect("parameters were checked against the registry")
     }
@@ -229,14 +231,11 @@ impl Inputs<'_> {
         for parameter in self.kind.parameters {
             if parameter.default.is_none() && !self.instance.parameters.contains_key(parameter.name)
             {
-                let (parameter, meaning, typical) =
-                    (parameter.name, parameter.meaning, parameter.typical);
-                let physics = physics();
                 return Err(InstanceError::MissingParameter {
-                    physics,
-                    parameter,
-                    meaning,
-                    typical,
+                    physics: physics(),
+                    parameter: parameter.name,
+                    meaning: parameter.meaning,
+                    typical: parameter.scaled(parameter.typical, self.design.length_ratio()),
                 });
             }
         }

@@ -253,7 +253,7 @@ pub struct KindParameter {
     pub real_scale: [f64; 2],
     /// Typical value on V-Track, from which a search starts.
     pub typical: f64,
-    /// Default value. `None`: the parameter is required.
+    /// Default value on V-Track. `None`: the parameter is required.
     pub default: Option<f64>,
     /// Numbers that the parameter may have.
     pub bound: Bound,
@@ -302,6 +302,13 @@ impl KindParameter {
         value * to[1] / from[1]
     }
 
+    /// Default value on a track whose lengths are `length_ratio` times V-Track's: [`scaled`](Self::scaled) unless
+    /// it is a pure number. `None`: the parameter is required.
+    pub fn default_at(&self, length_ratio: f64) -> Option<f64> {
+        let is_number = self.unit == "1";
+        self.default.map(|it| if is_number { it } else { self.scaled(it, length_ratio) })
+    }
+
     /// Name, unit and limits of the parameter. The limits are a thousand times, and a thousandth of, the
     /// ends of the expected ranges.
     pub fn quantity(&self) -> Quantity {
@@ -345,7 +352,7 @@ impl KindParameter {
         self
     }
 
-    /// Sets the default value. The parameter is then optional.
+    /// Sets the default value on V-Track. The parameter is then optional.
     #[must_use]
     pub const fn or(mut self, default: f64) -> Self {
         self.default = Some(default);

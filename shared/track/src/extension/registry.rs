@@ -141,6 +141,19 @@ mod tests {
     }
 
     #[test]
+    fn defaults_have_the_scale_of_the_track() {
+        let default = |kind: &Kind, name, ratio| kind.parameter(name).unwrap().default_at(ratio);
+        assert_eq!(default(RAIL_JOINT, "length_m", 1.0), Some(2e-2));
+        // Two thirds of the way from 5 mm to 4 cm, and from 0.1 m to 0.5 m.
+        let on_line = default(RAIL_JOINT, "length_m", 4.8).unwrap();
+        assert!((on_line - 0.1 * 5f64.powf(2.0 / 3.0)).abs() < 1e-12, "{on_line}");
+        // What changes nothing on the rig changes nothing on a line.
+        assert_eq!(default(RAIL_JOINT, "dip_m", 4.8), Some(0.0));
+        assert_eq!(default(RAIL_JOINT, "bending_factor", 4.8), Some(1.0));
+        assert_eq!(default(ELECTRICAL_HUM, "frequency_Hz", 4.8), Some(50.0));
+    }
+
+    #[test]
     fn the_catalogue_in_the_documentation_has_every_kind_and_parameter() {
         let catalogue = include_str!("../../../../docs/extensions.md");
         for kind in Kind::all() {
