@@ -230,7 +230,7 @@ fn stop(name: &str, error: &StreamingError) -> Stop {
 
 /// Prints a summary with the computing times.
 fn conclude(streamed: &Streamed) -> Result<(), Stop> {
-    let Streamed { rows, evaluated, outside, computing, longest, .. } = *streamed;
+    let Streamed { rows, evaluated, outside, not_tested, computing, longest, .. } = *streamed;
     if streamed.is_left {
         return Ok(());
     }
@@ -239,9 +239,13 @@ fn conclude(streamed: &Streamed) -> Result<(), Stop> {
     }
     let each_ms = 1e3 * computing.as_secs_f64() / evaluated.max(1) as f64;
     let longest_ms = 1e3 * longest.as_secs_f64();
+    let not_tested = match not_tested {
+        0 => String::new(),
+        sleepers => format!(", {sleepers} not tested against it, because no window was whole"),
+    };
     println_stderr(&format!(
-        "{evaluated} of {rows} sleepers evaluated, {outside} outside the library; {each_ms:.1} ms \
-         of computation each, at most {longest_ms:.1} ms for the rows of one sample"
+        "{evaluated} of {rows} sleepers evaluated, {outside} outside the library{not_tested}; \
+         {each_ms:.1} ms of computation each, at most {longest_ms:.1} ms for the rows of one sample"
     ));
     if streamed.is_negative() { Err(Stop::Negative) } else { Ok(()) }
 }

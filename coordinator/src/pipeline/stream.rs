@@ -15,6 +15,8 @@ pub struct Streamed {
     pub evaluated: usize,
     /// Number of sleepers with estimates that are outside the library.
     pub outside: usize,
+    /// Number of sleepers with estimates that could not be tested against the library.
+    pub not_tested: usize,
     /// Wall-clock time of computing all rows.
     pub computing: Duration,
     /// Longest wall-clock time of computing the rows that one sample completes.
@@ -37,10 +39,10 @@ pub enum StreamingError {
 }
 
 impl Streamed {
-    /// Whether the stream has a negative result: less than half of the sleepers have estimates inside the
-    /// library.
+    /// Whether the stream has a negative result: less than half of the sleepers have estimates that the
+    /// test found inside the library.
     pub const fn is_negative(&self) -> bool {
-        2 * (self.evaluated - self.outside) < self.rows
+        2 * (self.evaluated - self.outside - self.not_tested) < self.rows
     }
 
     /// Counts rows and passes them to `write`.
@@ -63,8 +65,9 @@ impl Streamed {
         self.rows += 1;
         if let Outcome::Evaluated(evaluated) = &row.outcome {
             self.evaluated += 1;
-            let is_outside = evaluated.sleeper.flags.contains(&Flag::OutsideLibrary);
-            self.outside += usize::from(is_outside);
+            let has = |flag| usize::from(evaluated.sleeper.flags.contains(&flag));
+            self.outside += has(Flag::OutsideLibrary);
+            self.not_tested += has(Flag::DomainNotTested);
         }
     }
 }
@@ -108,10 +111,12 @@ mod tests {
 
     #[test]
     fn a_stream_has_no_answer_if_most_sleepers_have_no_valid_estimates() {
-        let is_negative = |rows, evaluated, outside| {
-            Streamed { rows, evaluated, outside, ..Streamed::default() }.is_negative()
+        let is_negative = |rows, evaluated, outside, not_tested| {
+            let streamed = Streamed { rows, evaluated, outside, not_tested, ..Default::default() };
+            streamed.is_negative()
         };
-        assert!(!is_negative(10, 10, 0) && !is_negative(10, 7, 2));
-        assert!(is_negative(10, 6, 2) && is_negative(10, 4, 0) && is_negative(10, 0, 0));
+        assert!(!is_negative(10, 10, 0, 0) && !is_negative(10, 7, 2, 0));
+        assert!(is_negative(10, 6, 2, 0) && is_negative(10, 4, 0, 0) && is_negative(10, 0, 0, 0));
+        assert!(!is_negative(10, 10, 2, 3) && is_negative(10, 10, 0, 6));
     }
 }

@@ -69,8 +69,9 @@ pub fn evaluate(recording: &Recording, twin: &Twin<'_>) -> Result<Evaluation, Er
         .zip(estimates.into_iter().zip(even))
         .map(|(sleeper, estimates)| evaluated(recording, twin, &mut matcher, sleeper, estimates))
         .collect::<Result<Vec<_>, _>>()?;
-    let outside = sleepers.iter_mut().zip(&tests).filter(|(_, test)| test.outside);
-    outside.for_each(|(sleeper, _)| sleeper.flags.push(Flag::OutsideLibrary));
+    for (sleeper, test) in sleepers.iter_mut().zip(&tests) {
+        sleeper.flags.extend(test.flag());
+    }
     Ok(Evaluation {
         format: FORMAT,
         recording: recording.name.clone(),

@@ -160,6 +160,8 @@ pub enum Flag {
     LossOfContact,
     /// No track of the library can produce the features; the estimates are not valid.
     OutsideLibrary,
+    /// No pass covers a whole window with its margins, so that the features are not compared with the library.
+    DomainNotTested,
 }
 
 /// A sleeper without estimates.
@@ -192,6 +194,7 @@ impl Flag {
             Self::RailpadAtLeast => "railpad: at least",
             Self::LossOfContact => "loss of contact",
             Self::OutsideLibrary => "outside library: not valid",
+            Self::DomainNotTested => "not tested against the library",
         }
     }
 
@@ -206,6 +209,7 @@ impl Flag {
             Self::RailpadAtLeast => "railpad_at_least",
             Self::LossOfContact => "loss_of_contact",
             Self::OutsideLibrary => "outside_library",
+            Self::DomainNotTested => "domain_not_tested",
         }
     }
 }

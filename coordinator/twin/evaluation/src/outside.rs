@@ -23,6 +23,8 @@ const NAMED_FROM: f64 = 0.2;
 pub struct OutsideLibrary {
     /// Share of the evaluated sleepers, 0 to 1.
     pub share: f64,
+    /// Share of the evaluated sleepers that could not be tested, 0 to 1.
+    pub not_tested: f64,
     /// Parameters whose range must be wider, sorted by the number of sleepers they explain, largest first.
     pub widen: Vec<Parameter>,
     /// The ends of ranges that the track exceeds.
@@ -48,6 +50,7 @@ pub struct BeyondEnd {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct DomainTest {
     pub(crate) outside: bool,
+    is_tested: bool,
     beyond: Option<Beyond>,
     /// Sleepers in the window that is outside.
     window: usize,
@@ -56,6 +59,7 @@ pub(crate) struct DomainTest {
 impl DomainTest {
     /// Adds the result of a window; larger windows determine the exceeded range more reliably.
     fn take(&mut self, judgement: &Judgement, window: usize) {
+        self.is_tested = true;
         if !judgement.is_outside() {
             return;
         }
@@ -65,11 +69,23 @@ impl DomainTest {
             self.window = window;
         }
     }
+
+    /// The flag of the sleeper, if it needs one.
+    pub(crate) const fn flag(&self) -> Option<Flag> {
+        if self.outside {
+            Some(Flag::OutsideLibrary)
+        } else if self.is_tested {
+            None
+        } else {
+            Some(Flag::DomainNotTested)
+        }
+    }
 }
 
 /// Domain check of every sleeper, in the order of `sleepers`.
 ///
-/// Sleepers with incomplete windows take the result of the whole track only.
+/// Sleepers with incomplete windows take the result of the whole track only. If the windows of all sleepers with
+/// the same speeds are incomplete, none of these is tested.
 ///
 /// # Errors
 /// Errors of [`Domain`].
@@ -224,24 +240,31 @@ impl OutsideLibrary {
             }
         }
         let unexplained = outside.iter().filter(|test| test.beyond.is_none()).count();
-        let share = outside.len() as f64 / tests.len().max(1) as f64;
-        Self { share, widen, ends, unexplained }
+        let share_of = |count: usize| count as f64 / tests.len().max(1) as f64;
+        let not_tested = share_of(tests.iter().filter(|test| !test.is_tested).count());
+        Self { share: share_of(outside.len()), not_tested, widen, ends, unexplained }
     }
 
-    /// Whether most sleepers are outside; the recording as a whole then has no valid result.
+    /// Whether most sleepers are outside or not tested; the recording as a whole then has no valid result.
     pub fn is_most(&self) -> bool {
-        self.share > 0.5
+        self.share + self.not_tested > 0.5
     }
 
-    /// Sentences on the sleepers outside and the remedy; empty if no sleeper is outside.
+    /// Sentences on the sleepers outside or not tested, and the remedy; empty if all are inside.
     pub fn sentences(&self) -> Vec<String> {
-        if self.share <= 0.0 {
-            return Vec::new();
+        let mut sentences = Vec::new();
+        if self.not_tested > 0.0 {
+            sentences.push(format!(
+"{:.0} % of the sleepers are not tested against the library, because no pass covers a whole window with its margins: nothing says whether their estimates are valid. Record longer passes without gaps.",
+                (100.0 * self.not_tested).ceil()
+            ));
         }
-        let mut sentences = vec![format!(
-            "{:.0} % of the sleepers are outside the library: their estimates are not valid.",
-            (100.0 * self.share).ceil()
-        )];
+        if self.share > 0.0 {
+            sentences.push(format!(
+                "{:.0} % of the sleepers are outside the library: their estimates are not valid.",
+                (100.0 * self.share).ceil()
+            ));
+        }
         sentences.extend(self.ends.iter().map(BeyondEnd::sentence));
         if self.unexplained > 0 {
             sentences.push(format!(

@@ -2,7 +2,7 @@
 
 use super::row::Evaluated;
 use crate::estimate::{estimates, evaluated};
-use crate::evaluation::{Estimates, Flag};
+use crate::evaluation::Estimates;
 use crate::matches::Matcher;
 use crate::outside::judge_last;
 use crate::{Error, SleeperFeatures, SpeedFeatures, Twin, Unevenness};
@@ -78,16 +78,14 @@ impl<'a> Recent<'a> {
         let mut estimate = estimates(std::slice::from_ref(&features), &self.twin)?.remove(0);
         self.features.push(features.clone());
         self.estimates.push(estimate.clone());
-        let is_outside = judge_last(&self.features, library, by_speeds)?.outside;
-        self.outside.push(is_outside);
+        let test = judge_last(&self.features, library, by_speeds)?;
+        self.outside.push(test.outside);
         let told = self.estimates.iter().zip(&self.outside).filter(|(_, outside)| !**outside);
         let unevenness = Unevenness::of(&told.map(|(estimate, _)| estimate).collect::<Vec<_>>());
         let even = unevenness.widen(&mut estimate);
         let matcher = &mut self.matcher;
         let mut sleeper = evaluated(section, &self.twin, matcher, features, (estimate, even))?;
-        if is_outside {
-            sleeper.flags.push(Flag::OutsideLibrary);
-        }
+        sleeper.flags.extend(test.flag());
         Ok(Evaluated { sleeper, unevenness: unevenness.scatter })
     }
 }

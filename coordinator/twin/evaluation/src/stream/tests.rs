@@ -121,7 +121,8 @@ fn assert_same(streamed: &SleeperEvaluation, batch: &SleeperEvaluation) {
     assert!(sds.into_iter().all(|(a, b)| alike(*a, *b)));
     let own = |sleeper: &SleeperEvaluation| {
         let flags = sleeper.flags.iter().copied();
-        flags.filter(|flag| *flag != crate::Flag::OutsideLibrary).collect::<Vec<_>>()
+        let tests = [crate::Flag::OutsideLibrary, crate::Flag::DomainNotTested];
+        flags.filter(|flag| !tests.contains(flag)).collect::<Vec<_>>()
     };
     assert_eq!(own(streamed), own(batch), "{}", batch.id);
 }
@@ -193,6 +194,27 @@ fn gaps_and_missing_samples_end_a_pass_and_begin_another() {
         }
         assert!(batch.sleepers[8].flags.contains(&crate::Flag::ShortMargin));
     }
+}
+
+#[test]
+fn without_a_whole_window_no_sleeper_counts_as_inside() {
+    let models = Models::new();
+    // Beyond the library, and a sample lost every 500: a window and its margins never fit between.
+    let recording = testing::long_recording(20.0, &[13.0], 30);
+    let mut samples = samples(&recording.passes[0]);
+    let starts = (0..samples.len()).step_by(500);
+    let stretches: Vec<_> =
+        starts.map(|start| start + 1..(start + 500).min(samples.len())).collect();
+    samples.iter_mut().step_by(500).for_each(|sample| sample.acceleration_m_s2 = f64::NAN);
+    let batch = models.batch(&cut(&recording, &stretches));
+    assert_eq!((batch.outside_library.share, batch.outside_library.not_tested), (0.0, 1.0));
+    assert!(batch.outside_library.is_most());
+    assert!(batch.notes.iter().any(|note| note.contains("not tested against the library")));
+    let rows = models.rows(&recording, &samples);
+    let streamed = evaluated(&rows);
+    assert!(streamed.len() > 10);
+    let is_told = |it: &SleeperEvaluation| it.flags.contains(&crate::Flag::DomainNotTested);
+    assert!(batch.sleepers.iter().all(is_told) && streamed.into_iter().all(is_told));
 }
 
 #[test]
