@@ -1,10 +1,15 @@
 //! Several machines share a blind trial. It loses nothing if one of them stops, and it continues if a
-//! diagnosis fails.
+//! diagnosis fails. Its recordings hold nothing of their truth.
 
+#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
+
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 use system_tests::{run, until};
+use tracktwin_parameters::Preset;
+use tracktwin_trial::{Class, Making, Plan, plan_on};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 
@@ -90,4 +95,53 @@ fn a_case_whose_diagnosis_breaks_down_is_named_at_the_end_and_stops_no_other() {
     assert!(answer.err.contains("case 0: ") && answer.err.contains("case 1: "), "{}", answer.err);
     let table = std::fs::read_to_string(out.join("trial.md")).unwrap();
     assert!(table.contains("| diagnoses that broke down | 2 of 2: 100 %"), "{table}");
+}
+
+/// Content of every file of a recording, by name.
+fn files(plan: &Plan, folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    plan.making.record(&plan.scene, folder).unwrap();
+    let content = |entry: std::io::Result<std::fs::DirEntry>| {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        (name, std::fs::read(&path).unwrap())
+    };
+    std::fs::read_dir(folder).unwrap().map(content).collect()
+}
+
+/// The manifest of a recording.
+fn manifest(files: &BTreeMap<String, Vec<u8>>) -> String {
+    String::from_utf8(files["recording.json"].clone()).unwrap()
+}
+
+/// Checks that only the samples of a case of this making depend on its truth. Returns the manifest.
+fn check_recording(preset: Preset, making: Making) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let is_wanted = |it: &Plan| (it.class, it.making) == (Class::Single, making);
+    let mut plans = (0..40).map(|number| plan_on(preset, 20_270_101, number));
+    let mut plan = plans.find(is_wanted).unwrap();
+    plan.scene.passes.truncate(1);
+    let found = files(&plan, &folder.path().join("effect"));
+    let (kind, seed) = (plan.scene.left_out[0].physics(), plan.scene.seed.to_string());
+    for (name, content) in &found {
+        let has = |word: &&str| {
+            name.contains(*word) || content.windows(word.len()).any(|it| it == word.as_bytes())
+        };
+        let words = [kind, &seed, "simulator", "left_out", "control", "single"];
+        assert_eq!(words.into_iter().find(has), None, "{name}");
+    }
+    // The same track without the effect, and with another surface.
+    plan.scene.left_out.clear();
+    plan.scene.seed += 1;
+    let control = files(&plan, &folder.path().join("control"));
+    assert_eq!(found.keys().collect::<Vec<_>>(), control.keys().collect::<Vec<_>>());
+    assert_eq!(manifest(&found), manifest(&control));
+    manifest(&found)
+}
+
+#[test]
+fn a_recording_holds_nothing_of_its_truth_but_its_samples() {
+    let [plain, varied, second] = Making::ALL.map(|it| check_recording(Preset::VTrack, it));
+    assert_eq!(plain, varied);
+    assert_eq!(plain, second);
+    check_recording(Preset::Concrete60E1, Making::Second);
 }

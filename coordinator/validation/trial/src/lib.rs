@@ -4,6 +4,7 @@
 //! ([`CaseScore`], [`Summary`]). Simulators that share no discretisation with the diagnosis make the
 //! recordings ([`Making`]). The command `trial` diagnoses the recordings and writes files.
 
+mod baseline;
 mod class;
 mod draw;
 mod effect;
@@ -11,6 +12,7 @@ mod known;
 mod line_effect;
 mod making;
 mod measures;
+mod names;
 mod paper;
 mod place;
 mod rate;
@@ -20,15 +22,18 @@ mod site;
 mod strength;
 mod summary;
 mod table;
+#[cfg(test)]
+mod testing;
 mod varied;
 mod visible;
 
+pub use baseline::Bias;
 pub use class::Class;
 pub use draw::{FORMAT, Plan, orders, plan, plan_on};
 pub use making::Making;
 pub use paper::Paper;
 pub use rate::Rate;
-pub use score::{Bias, CaseScore, KnockedOut, Named, Placed, placed, score};
+pub use score::{CaseScore, KnockedOut, Named, Placed, placed, score};
 pub use seal::{SealError, Seals};
 pub use strength::StrengthRow;
 pub use summary::{KindRow, MeasureRow, Summary};

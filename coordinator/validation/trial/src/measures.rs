@@ -51,13 +51,14 @@ pub(crate) fn alone(scores: &[CaseScore]) -> impl Iterator<Item = (&CaseScore, &
 pub(crate) fn measures(
     planned: usize,
     scores: &[CaseScore],
-    usual: Option<Usual>,
+    usual: Option<&Usual<'_>>,
 ) -> Vec<Measured> {
     let broken_down = Rate { hits: (planned - scores.len()) as u64, of: planned as u64 };
     let mut all = not_shown(scores, usual);
     all.extend(of_any_strength(scores));
     all.extend(alarms(scores));
     all.extend(names(scores));
+    all.extend(gains(scores));
     all.extend(places(scores));
     all.extend([calibration(scores), bias(scores), cost(scores)]);
     all.push(at_most("diagnoses that broke down", broken_down, 0.0));
@@ -65,9 +66,10 @@ pub(crate) fn measures(
 }
 
 /// What is said of effects that the method of the paper does not show.
-fn not_shown(scores: &[CaseScore], usual: Option<Usual>) -> Vec<Measured> {
+fn not_shown(scores: &[CaseScore], usual: Option<&Usual<'_>>) -> Vec<Measured> {
     let shown_as_usual = |score: &CaseScore| {
-        usual.zip(score.paper.as_ref()).is_some_and(|(usual, paper)| usual.is_content(paper))
+        let tested = usual.zip(score.paper.as_ref());
+        tested.and_then(|(usual, paper)| usual.is_content(paper)) == Some(true)
     };
     let hidden: Vec<_> = alone(scores).filter(|(score, _)| shown_as_usual(score)).collect();
     let rate = |is_so: fn(&CaseScore, &Named) -> bool| {
@@ -125,16 +127,24 @@ fn alarms(scores: &[CaseScore]) -> Vec<Measured> {
     let detected = |least| Rate::of(visible(scores, least).map(|(score, _)| alarmed(score)));
     let controls = Rate::of(of_class(scores, Class::Control).map(alarmed));
     let artefacts =
-        Rate::of(of_class(scores, Class::Artefact).map(|score| is_physics(score.verdict)));
+        |is_so: &dyn Fn(&CaseScore) -> bool| Rate::of(of_class(scores, Class::Artefact).map(is_so));
+    let called_physics = artefacts(&|score| is_physics(score.verdict));
     let shuffled = scores.iter().filter_map(|score| score.shuffled);
     let shuffled = Rate::of(shuffled.map(is_physics));
     vec![
         at_most("false alarms on controls", controls, 0.05),
-        at_most("artefacts called physics", artefacts, 0.02),
+        at_most("artefacts called physics", called_physics, 0.02),
+        without_goal("artefacts detected", artefacts(&alarmed)),
+        without_goal("artefacts named first", artefacts(&is_named_fault)),
         at_least("detected, d' 6.5 and more", detected(SURE), 0.95),
         at_least("detected, d' 5 and more", detected(LIKELY), 0.75),
         at_most("of local effects found, called physics with sleepers shuffled", shuffled, 0.05),
     ]
+}
+
+/// Whether a fault of the measuring chain is the first name, and the verdict is such a fault.
+fn is_named_fault(score: &CaseScore) -> bool {
+    score.verdict == Verdict::MeasurementChain && score.hidden.iter().all(|named| named.first)
 }
 
 fn names(scores: &[CaseScore]) -> Vec<Measured> {
@@ -147,7 +157,6 @@ fn names(scores: &[CaseScore]) -> Vec<Measured> {
     let one = Rate::of(doubles().map(|score| score.hidden.iter().any(|named| named.accepted)));
     let both = Rate::of(doubles().map(|score| score.hidden.iter().all(|named| named.accepted)));
     let without = Rate::of(knocked_out(scores).map(|knocked_out| knocked_out.unknown));
-    let gains = scores.iter().filter_map(|score| score.held_out_gain_nats);
     vec![
         at_least("named first, of those detected", Rate::of(found().map(|(_, n)| n.first)), 0.85),
         at_least(
@@ -170,11 +179,25 @@ fn names(scores: &[CaseScore]) -> Vec<Measured> {
         at_least("knocked out of the catalogue: called unknown", without, 0.8),
         at_least("two hidden: one of them named", one, 0.9),
         at_least("two hidden: both named", both, 0.6),
-        at_least(
-            "held-out gain positive, of what is accepted",
-            Rate::of(gains.map(|g| g > 0.0)),
-            0.95,
-        ),
+    ]
+}
+
+/// Held-out gains: how many are positive, and how large they are for right and for wrong names.
+fn gains(scores: &[CaseScore]) -> Vec<Measured> {
+    let gains = scores.iter().filter_map(|score| score.held_out_gain_nats);
+    let positive = Rate::of(gains.map(|gain| gain > 0.0));
+    let of = |measure, is_right: bool| {
+        let named = scores.iter().filter(|it| it.is_first_name_right() == Some(is_right));
+        let gains: Vec<f64> = named.filter_map(|score| score.held_out_gain_nats).collect();
+        let of = gains.len() as u64;
+        let value = median(gains)
+            .map_or("none".to_owned(), |median| format!("median {median:.0} nats (of {of})"));
+        Measured { measure, value, goal: None, reached: None, badness: None, of }
+    };
+    vec![
+        at_least("held-out gain positive, of what is accepted", positive, 0.95),
+        of("held-out gain where the first name is right", true),
+        of("held-out gain where the first name is wrong", false),
     ]
 }
 

@@ -62,9 +62,8 @@ pub struct KindRow {
     /// Rate of cases in which the fitted baseline does not show the effect: parameters inside their usual
     /// ranges, and no cell far beyond the random variation.
     pub concealed: Rate,
-    /// Rate of cases in which the method of the paper does not show the effect: parameters inside Table
-    /// D1, and an error of the model selector as usual for controls. Without observations if the method
-    /// was not tested.
+    /// Rate of cases in which the method of the paper does not show the effect: the largest error of the model
+    /// selector next to it is usual for controls. Without observations if the method was not tested.
     pub content: Rate,
 }
 
@@ -74,7 +73,8 @@ impl Summary {
     pub fn new(planned: &[Making], scores: &[CaseScore]) -> Self {
         let makings: BTreeSet<Making> = planned.iter().copied().collect();
         let controls = of_class(scores, Class::Control).filter_map(|score| score.paper.as_ref());
-        let usual = Usual::of(&controls.collect::<Vec<_>>());
+        let usual = Usual::of(controls);
+        let usual = usual.as_ref();
         let of = |making: Making| {
             let planned = planned.iter().filter(|other| **other == making).count();
             let scores: Vec<CaseScore> =
@@ -118,7 +118,7 @@ fn worst(parts: &[(Making, &Measured)]) -> Option<Making> {
     (worst.1 > best.1).then_some(worst.0)
 }
 
-fn kinds(scores: &[CaseScore], usual: Option<Usual>) -> Vec<KindRow> {
+fn kinds(scores: &[CaseScore], usual: Option<&Usual<'_>>) -> Vec<KindRow> {
     let all = || {
         let single = scores.iter().filter(|score| score.hidden.len() == 1);
         single.filter_map(|score| Some((score, score.hidden.first()?)))
@@ -135,7 +135,7 @@ fn kinds(scores: &[CaseScore], usual: Option<Usual>) -> Vec<KindRow> {
             detectability: median(of().filter_map(|(_, named)| named.detectability).collect()),
             concealed: Rate::of(of().map(|(s, _)| s.parameters_inside && s.cells_inside)),
             content: Rate::of(
-                of().filter_map(|(score, _)| Some(usual?.is_content(score.paper.as_ref()?))),
+                of().filter_map(|(score, _)| usual?.is_content(score.paper.as_ref()?)),
             ),
         }
     };
@@ -189,14 +189,14 @@ mod tests {
             accepted: found,
             place: Some(Placed { error_spacings: found.then_some(0.2) }),
         };
-        let paper = Some(Paper { mape: vec![mape; 24], inside: true });
+        let paper = Some(Paper { best_mape: vec![mape; 24] });
         CaseScore { class: Class::Single, hidden: vec![hidden], paper, ..control(number, verdict) }
     }
 
     #[test]
     fn the_first_rows_are_of_effects_that_the_method_of_the_paper_does_not_show() {
         let usual = |n| {
-            let paper = Some(Paper { mape: vec![0.1; 24], inside: true });
+            let paper = Some(Paper { best_mape: vec![0.1; 24] });
             CaseScore { paper, ..control(n, Verdict::Consistent) }
         };
         let mut scores: Vec<CaseScore> = (0..6).map(usual).collect();
@@ -213,7 +213,8 @@ mod tests {
         assert!(all.value.starts_with("3 of 4:"), "{all:?}");
         let detected: Vec<_> = summary.strengths.iter().map(|row| row.detected).collect();
         let rate = |hits, of| Rate { hits, of };
-        let expected = [rate(0, 0), rate(1, 2), rate(0, 0), rate(1, 1), rate(1, 1), rate(0, 0)];
+        let none = rate(0, 0);
+        let expected = [none, rate(1, 2), none, rate(1, 1), rate(1, 1), none, none];
         assert_eq!(detected, expected);
         let page = summary.to_markdown(&scores);
         assert!(page.contains("| 3 to 5 | 1 of 2 | 1 of 2 | 1 of 2 |"), "{page}");
@@ -222,6 +223,51 @@ mod tests {
             score.paper = None;
         }
         assert_eq!(Summary::new(&makings(12), &scores).rows[0].value, "none");
+    }
+
+    /// A single case of a kind, with what was said first.
+    fn named(class: Class, verdict: Verdict, [physics, said]: [&str; 2], gain: f64) -> CaseScore {
+        let mut score = CaseScore { class, ..single(0, 1.0, 0.1) };
+        score.hidden[0].physics = physics.to_owned();
+        score.hidden[0].first = physics == said;
+        score.accepted.push(said.to_owned());
+        CaseScore { verdict, held_out_gain_nats: Some(gain), ..score }
+    }
+
+    #[test]
+    fn faults_of_the_measuring_chain_and_held_out_gains_have_rows_without_a_target() {
+        use Verdict::{LeftOutPhysics, MeasurementChain, UnknownPhysics};
+        let (fault, effect) = (Class::Artefact, Class::Single);
+        let mut missed = named(fault, Verdict::Consistent, ["clipping", ""], 0.0);
+        missed.held_out_gain_nats = None;
+        missed.accepted.clear();
+        let scores = [
+            missed,
+            named(fault, MeasurementChain, ["clipping", "clipping"], 30.0),
+            named(fault, MeasurementChain, ["clipping", "gain_error"], 70.0),
+            named(fault, LeftOutPhysics, ["clipping", "squat"], 90.0),
+            named(effect, LeftOutPhysics, ["wheel_out_of_round", "wheel_out_of_round"], 50.0),
+            named(effect, UnknownPhysics, ["squat", "unknown_physics"], 9.0),
+        ];
+        let summary = Summary::new(&[Making::Plain; 6], &scores);
+        let value = |measure| {
+            let row = row(&summary, measure);
+            (row.value.split(':').next().unwrap(), row.goal.as_deref())
+        };
+        assert_eq!(value("artefacts detected"), ("3 of 4", None));
+        assert_eq!(value("artefacts named first"), ("1 of 4", None));
+        let [right, wrong] =
+            ["right", "wrong"].map(|it| format!("held-out gain where the first name is {it}"));
+        assert_eq!(value(&right), ("median 40 nats (of 2)", None));
+        assert_eq!(value(&wrong), ("median 80 nats (of 2)", None));
+        let page = summary.to_markdown(&scores);
+        assert!(
+            page.contains("| `wheel_out_of_round` of any d', in the passes | 1 of 1 |"),
+            "{page}"
+        );
+        assert!(page.contains("| 0 to 3 | 1 of 1 | 1 of 1 | 0 of 1 |"), "{page}");
+        // Missed, a fault is no right answer.
+        assert!(page.contains("| 0 | plain | `clipping` (1.0) | consistent |"), "{page}");
     }
 
     /// Makings in turn.

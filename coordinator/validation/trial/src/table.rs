@@ -7,6 +7,10 @@ use crate::strength::StrengthRow;
 use crate::summary::{KindRow, MeasureRow, Summary};
 use std::fmt::Write;
 
+/// What the tables say about the held-out gain.
+const NOTE: &str = "\nNote: the rule of acceptance demands a held-out gain of 4 nats or more of a kind. So a named kind \
+cannot miss this target; only \"unknown\" can.\n";
+
 impl Summary {
     /// The tables, with one line for each case whose diagnosis is not completely correct.
     pub fn to_markdown(&self, scores: &[CaseScore]) -> String {
@@ -16,6 +20,7 @@ impl Summary {
         page.push_str(&"---|".repeat(self.makings.len() + 5));
         page.push('\n');
         self.rows.iter().for_each(|row| page.push_str(&measure(row)));
+        page.push_str(NOTE);
         page.push_str(
             "\n| d' of effects that were hidden alone | alarm | family first | member first \
              |\n|---|---|---|---|\n",

@@ -1,5 +1,7 @@
 //! Detectability `d'` of a hidden effect after the baseline was fitted again.
 //!
+//! It counts the change of the band levels. Wheel orders that the inspection finds in the passes may have a small one.
+//!
 //! This module reads the truth. It must run only after the result of the diagnosis was stored.
 
 use crate::known::kind;
@@ -14,7 +16,7 @@ use tracktwin_track::extension::ExtensionInstance;
 const CRACK_V_TRACK_M: f64 = 0.02;
 const CRACK_LINE_M: f64 = 0.05;
 
-/// `d'` of a hidden effect. `None` if the forward model does not contain the effect.
+/// `d'` of a hidden effect. 0 if stiffnesses imitate all of its band levels, `None` if the forward model does not contain the effect.
 ///
 /// # Errors
 /// [`CalibrationError`] if no track can be built from the true values.
@@ -27,8 +29,7 @@ pub fn detectability(
 ) -> Result<Option<f64>, CalibrationError> {
     let Some(extension) = in_recording(recording, prepared, scene, hidden) else { return Ok(None) };
     let values = values(recording, prepared, search, scene);
-    let length = signature(prepared, &search.observation, &values, extension)?;
-    Ok((length > 0.0).then_some(length))
+    signature(prepared, &search.observation, &values, extension).map(Some)
 }
 
 /// The effect in terms of the recording: compared sleepers count from 0.
