@@ -140,6 +140,17 @@ fn settings_of_deployed_programs_are_understood() {
     assert!(count > 10, "only {count} settings were found");
 }
 
+#[test]
+fn what_containers_mount_exists() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let text = fs::read_to_string(root.join("docker-compose.yml")).unwrap();
+    let mounted = text.split('"').filter(|it| it.starts_with("./")).map(|it| {
+        let folder = it.split_once(':').unwrap().0;
+        assert!(root.join(folder).exists(), "{folder}");
+    });
+    assert!(mounted.count() > 0);
+}
+
 /// The anchors of a page's headings, in the form that GitHub generates.
 fn anchors(page: &str) -> BTreeSet<String> {
     let mut anchors = BTreeSet::new();

@@ -10,7 +10,7 @@ use tokio::net::TcpListener;
 use tokio::task::{JoinError, JoinHandle};
 use tokio_util::sync::{CancellationToken, DropGuard};
 use tracktwin_experiment::{Prepare, prepare_simulation};
-use tracktwin_library::{Claim, Library, LibraryError, Status};
+use tracktwin_library::{CampaignState, Claim, Library, LibraryError, Status};
 use tracktwin_worker::agent::{self, AgentError};
 use tracktwin_worker::{Credentials, Holdings, Token};
 
@@ -29,6 +29,17 @@ pub enum FarmError {
     /// The campaign cannot be dispatched.
     #[error(transparent)]
     Dispatch(#[from] DispatchError),
+    /// Somebody paused or cancelled the campaign, or a coordinator did so because it cannot dispatch it.
+    #[error(
+        "campaign {campaign} is {}, and its cases are not simulated; continue it with `tracktwin campaign resume {campaign}`",
+        .state.name()
+    )]
+    NotRunning {
+        /// Id of the campaign.
+        campaign: String,
+        /// Its state.
+        state: CampaignState,
+    },
     /// The worker ended with an error.
     #[error("the workers stopped: {0}")]
     Worker(#[from] AgentError),
@@ -114,6 +125,16 @@ pub async fn run_claimed(
     Ok(status)
 }
 
+/// Checks that the cases of a campaign are leased. A library that is away is not an error here.
+async fn check_running(library: &Library, campaign: &str) -> Result<(), FarmError> {
+    match library.campaign_state(campaign).await {
+        Ok(state) if state != CampaignState::Running => {
+            Err(FarmError::NotRunning { campaign: campaign.to_owned(), state })
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Result of the worker's task.
 type Ended = Result<Result<(), AgentError>, JoinError>;
 
@@ -169,6 +190,7 @@ impl Running {
                     if status.done() == status.total() {
                         return Ok(None);
                     }
+                    check_running(library, task.campaign).await?;
                 }
                 Err(error) => outage.waits_for_library(error)?,
             }

@@ -95,6 +95,17 @@ impl Library {
         self.set_state(campaign, CampaignState::Cancelled).await
     }
 
+    /// The state of a campaign.
+    ///
+    /// # Errors
+    /// Returns [`LibraryError::UnknownCampaign`], or an error if the library cannot be read.
+    pub async fn campaign_state(&self, campaign: &str) -> Result<CampaignState, LibraryError> {
+        let read = sql("select state from campaign where id = $1").bind(campaign);
+        let rows = self.readers().rows(read).await?;
+        let unknown = || LibraryError::UnknownCampaign { id: campaign.to_owned() };
+        CampaignState::from_name(&rows.first().ok_or_else(unknown)?.get::<String>("state")?)
+    }
+
     async fn set_state(&self, campaign: &str, state: CampaignState) -> Result<(), LibraryError> {
         let now_unix_ms = self.now_unix_ms();
         self.write(SetState { campaign: campaign.to_owned(), state, now_unix_ms }).await

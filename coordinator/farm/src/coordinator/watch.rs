@@ -113,7 +113,7 @@ impl Remaining {
         if paused > 0 {
             tracing::warn!(cases = paused, "done, except for paused campaigns");
         } else if audits > 0 {
-            tracing::warn!(audits, "waiting: audits need a second worker");
+            tracing::warn!(audits, "done, except for audits, which need a second worker");
         } else {
             tracing::info!("all campaigns are done");
         }

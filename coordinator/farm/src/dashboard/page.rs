@@ -196,10 +196,23 @@ fn spectra(campaign: &FarmCampaign) -> String {
     chart.into_svg()
 }
 
+/// Least and greatest value among the cases of a campaign, which has at least one.
+fn extent(campaign: &FarmCampaign, parameter: Parameter) -> [f64; 2] {
+    let cases = campaign.covered.iter().chain(&campaign.given_up);
+    let [low, high] = cases
+        .map(|set| set[parameter])
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
+            [low.min(value), high.max(value)]
+        });
+    // A single case stands in the middle.
+    let margin = 0.03 * (high - low).max(0.1 * high.abs());
+    [low - margin, high + margin]
+}
+
 fn scatter(campaign: &FarmCampaign, [x, y]: [Parameter; 2]) -> String {
     let axis = |parameter: Parameter| {
         let shown = Shown::of(parameter);
-        let [low, high] = parameter.range();
+        let [low, high] = extent(campaign, parameter);
         let label = format!("{} in {}", parameter.label(), shown.unit);
         Axis::linear(&label, low / shown.divisor, high / shown.divisor)
     };
@@ -257,6 +270,20 @@ mod tests {
             assert!(page.contains(part), "{part}");
         }
         assert!(page.contains("a&lt;b&gt;-1234") && !page.contains("a<b>"));
+    }
+
+    #[test]
+    fn the_axes_of_the_parameter_space_hold_the_cases_of_any_track() {
+        let mut line = farm().campaigns.remove(0);
+        let mut stiffer = ParameterSet::nominal();
+        let stiffness = Parameter::RailpadStiffness;
+        stiffer[stiffness] *= 5.0;
+        line.given_up = vec![stiffer];
+        let [low, high] = extent(&line, stiffness);
+        assert!(low < line.covered[0][stiffness] && stiffer[stiffness] < high, "{low} {high}");
+        line.given_up.clear();
+        let [low, high] = extent(&line, stiffness);
+        assert!(low < line.covered[0][stiffness] && line.covered[0][stiffness] < high);
     }
 
     #[test]

@@ -22,12 +22,26 @@ pub enum DispatchError {
         /// Cause.
         source: ExperimentError,
     },
+    /// Another version stored the experiment in a form that this version does not reproduce.
+    #[error(
+        "campaign {campaign}: another version of tracktwin stored its experiment, and this version would simulate it in \
+         another form; continue it with that version, or add the campaign again under another name"
+    )]
+    OtherForm {
+        /// Id of the campaign.
+        campaign: String,
+    },
 }
 
 impl DispatchError {
     /// Whether later calls fail too: this version cannot simulate the campaign, or its stored data are invalid.
     pub(crate) const fn is_lasting(&self) -> bool {
-        matches!(self, Self::Experiment { .. } | Self::Library(LibraryError::Damaged { .. }))
+        matches!(
+            self,
+            Self::Experiment { .. }
+                | Self::OtherForm { .. }
+                | Self::Library(LibraryError::Damaged { .. })
+        )
     }
 }
 
@@ -43,6 +57,10 @@ impl Served {
     fn new(record: CampaignRecord) -> Result<Self, DispatchError> {
         let experiment = Experiment::from_json(&record.experiment_json)
             .map_err(|source| DispatchError::Experiment { campaign: record.id.clone(), source })?;
+        // Every worker makes the same check, and would end.
+        if experiment.hash() != record.experiment_hash {
+            return Err(DispatchError::OtherForm { campaign: record.id });
+        }
         let shape = Shape {
             bins: experiment.features.frequencies_hz().len(),
             speeds_km_h: experiment.speeds_km_h.clone(),
@@ -103,6 +121,26 @@ mod tests {
     use super::*;
 
     #[test]
+    fn an_experiment_of_another_form_is_refused_before_a_worker_gets_it() {
+        let experiment =
+            crate::campaign::Campaign::built_in(Some(2)).unwrap().definition.experiment;
+        let record = CampaignRecord {
+            id: "c".to_owned(),
+            name: "c".to_owned(),
+            definition_json: String::new(),
+            definition_hash: String::new(),
+            experiment_json: experiment.to_json(),
+            experiment_hash: experiment.hash(),
+            speeds_km_h: experiment.speeds_km_h.clone(),
+            seed: 1,
+        };
+        assert!(Served::new(record.clone()).is_ok());
+        let other = CampaignRecord { experiment_hash: "0".to_owned(), ..record };
+        let Err(error) = Served::new(other) else { panic!("another form was accepted") };
+        assert!(error.is_lasting() && error.to_string().contains("another version"), "{error}");
+    }
+
+    #[test]
     fn a_library_that_is_away_is_no_reason_to_give_a_campaign_up() {
         let away = || LibraryError::Unavailable { reason: "no response".to_owned() };
         for error in [away(), LibraryError::DiskFull, LibraryError::Busy, LibraryError::Closed] {
@@ -110,6 +148,7 @@ mod tests {
         }
         let source = Experiment::from_json("?").unwrap_err();
         assert!(DispatchError::Experiment { campaign: "c".to_owned(), source }.is_lasting());
+        assert!(DispatchError::OtherForm { campaign: "c".to_owned() }.is_lasting());
         let damaged = LibraryError::Damaged { what: "campaign c: speeds_km_h".to_owned() };
         assert!(DispatchError::Library(damaged).is_lasting());
     }

@@ -30,6 +30,26 @@ fn troubled(experiment: &Experiment) -> Result<Box<dyn Simulate>, ExperimentErro
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_campaign_that_is_paused_or_cancelled_ends_the_run_with_the_remedy() {
+    let campaign = Campaign::built_in(Some(20)).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let library = library(&folder, &campaign).await;
+    let id = campaign.id();
+    let run = || {
+        let shutdown = CancellationToken::new();
+        embedded::run_embedded(&library, task(&id, campaign.cases), shutdown, |_| {})
+    };
+    library.pause(&id).await.unwrap();
+    let error = run().await.unwrap_err();
+    assert!(matches!(error, FarmError::NotRunning { .. }), "{error}");
+    assert!(error.to_string().contains(&format!("campaign resume {id}")), "{error}");
+    library.cancel(&id).await.unwrap();
+    assert!(run().await.unwrap_err().to_string().contains("cancelled"));
+    library.resume(&id).await.unwrap();
+    assert_eq!(run().await.unwrap().finished, 20);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_campaign_that_is_stopped_and_gone_on_with_has_the_digest_of_an_undisturbed_one() {
     let campaign = Campaign::built_in(Some(600)).unwrap();
     let folder = tempfile::tempdir().unwrap();
