@@ -238,6 +238,7 @@ fn estimates_outside_the_library_are_drawn_and_said_as_not_valid() {
     };
     evaluation.outside_library = OutsideLibrary {
         share: 1.0,
+        not_tested: 0.0,
         widen: vec![Parameter::BallastStiffness],
         ends: vec![end],
         unexplained: 0,

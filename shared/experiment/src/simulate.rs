@@ -171,6 +171,7 @@ fn measured(mut record: PassRecord, model: &TrackModel) -> PassRecord {
         time_step_s: record.time_step_s,
         position_m: vec![0.0; record.acceleration_m_s2.len()],
         acceleration_m_s2: record.acceleration_m_s2,
+        first: 0,
     };
     model.measure(&mut measured);
     record.acceleration_m_s2 = measured.acceleration_m_s2;

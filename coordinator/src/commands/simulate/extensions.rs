@@ -62,13 +62,10 @@ impl Extensions {
 /// All kinds with their parameters, on a track whose lengths are `length_ratio` times those of V-Track.
 pub(in crate::commands) fn list(length_ratio: f64) -> String {
     let parameter = |parameter: &KindParameter| {
-        let given = match parameter.default_at(length_ratio) {
-            Some(value) => format!("default {}", rounded(value)),
-            None => {
-                let typical = parameter.scaled(parameter.typical, length_ratio);
-                format!("required, e.g. {:e}", rounded(typical))
-            }
-        };
+        let typical = rounded(parameter.scaled(parameter.typical, length_ratio));
+        let given = parameter
+            .default_at(length_ratio)
+            .map_or(format!("required, e.g. {typical:e}"), |it| format!("default {}", rounded(it)));
         format!("\n  {}: {}; {given}", parameter.name, parameter.meaning)
     };
     let kind = |kind: &Kind| {

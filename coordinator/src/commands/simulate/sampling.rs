@@ -14,18 +14,19 @@ pub(super) fn sample_rate_hz(time_step_s: f64) -> f64 {
     (1e9 / time_step_s).round() / 1e9
 }
 
-/// Filtered accelerations in m/s2 and positions in m at the samples of a recorder, from time step `first` on. The last
+/// Filtered accelerations in m/s2 and positions in m at the samples of a recorder, from the first kept one on. The last
 /// samples, whose filter would need later time steps, are left out; of a short pass no sample is left.
 ///
 /// The filter is a sinc with Blackman's window and has no delay. It passes what lies below 0.4 of the sample rate and
 /// stops what lies above a half.
-pub(super) fn resampled(measured: &Measured, first: usize, sample_rate_hz: f64) -> [Vec<f64>; 2] {
-    let Measured { time_step_s, acceleration_m_s2, position_m } = measured;
+pub(super) fn resampled(measured: &Measured, sample_rate_hz: f64) -> [Vec<f64>; 2] {
+    let Measured { time_step_s, acceleration_m_s2, position_m, first } = measured;
+    let first = *first as f64;
     let steps = 1.0 / (sample_rate_hz * time_step_s);
     let reach = REACH * steps;
     let last = acceleration_m_s2.len() as f64 - 1.0 - reach;
-    let count = (((last - first as f64) / steps).floor() + 1.0).max(0.0) as usize;
-    let places = (0..count).map(|sample| first as f64 + sample as f64 * steps);
+    let count = (((last - first) / steps).floor() + 1.0).max(0.0) as usize;
+    let places = (0..count).map(|sample| first + sample as f64 * steps);
     let filtered = |place: f64| {
         let taps = (place - reach).ceil().max(0.0) as usize..=(place + reach) as usize;
         let [mut sum, mut weights] = [0.0; 2];
@@ -65,8 +66,9 @@ mod tests {
                     time_step_s: 1e-5,
                     acceleration_m_s2: (0..40_000).map(|step| angle(step).sin()).collect(),
                     position_m: (0..40_000).map(|step| 1e-5 * f64::from(step)).collect(),
+                    first: 10_000,
                 };
-                resampled(&measured, 10_000, sample_rate_hz)
+                resampled(&measured, sample_rate_hz)
             };
             let frequency_hz = 0.39 * sample_rate_hz;
             let [samples, times_s] = heard(frequency_hz);
@@ -86,13 +88,14 @@ mod tests {
 
     #[test]
     fn a_pass_that_is_shorter_than_the_filter_has_no_samples() {
-        let measured = Measured {
+        let from = |first: usize| Measured {
             time_step_s: 1e-5,
             acceleration_m_s2: vec![0.0; 3000],
             position_m: vec![0.0; 3000],
+            first,
         };
-        assert!(resampled(&measured, 0, 1000.0).iter().all(Vec::is_empty));
-        assert!(resampled(&measured, 3000, 50_000.0).iter().all(Vec::is_empty));
-        assert_eq!(resampled(&measured, 0, 2000.0)[0].len(), 20);
+        assert!(resampled(&from(0), 1000.0).iter().all(Vec::is_empty));
+        assert!(resampled(&from(3000), 50_000.0).iter().all(Vec::is_empty));
+        assert_eq!(resampled(&from(0), 2000.0)[0].len(), 20);
     }
 }

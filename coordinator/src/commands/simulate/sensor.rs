@@ -72,12 +72,13 @@ impl Sensor {
             time_step_s: record.time_step_s,
             acceleration_m_s2: record.acceleration_m_s2.clone(),
             position_m: (0..count).map(position).collect(),
+            first,
         };
         model.measure(&mut measured);
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let sample_rate_hz = self.sample_rate_hz(record.time_step_s)?;
         let [mut samples, mut position_m] = match self.sample_rate {
-            Some(_) => resampled(&measured, first, sample_rate_hz),
+            Some(_) => resampled(&measured, sample_rate_hz),
             None => [measured.acceleration_m_s2, measured.position_m]
                 .map(|mut all| all.split_off(first)),
         };

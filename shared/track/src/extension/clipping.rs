@@ -50,6 +50,7 @@ mod tests {
                 time_step_s: 1e-5,
                 acceleration_m_s2: vec![-5.0, 1.0, 2.0],
                 position_m: vec![0.0, 1.0, 2.0],
+                first: 0,
             };
             track(&chain).measure(&mut measured);
             measured.acceleration_m_s2

@@ -41,7 +41,7 @@ pub(super) const KIND: Kind = Kind {
     },
 };
 
-/// `a sin(w t + phi)`, with `t` from the first sample.
+/// `a sin(w t + phi)`, with `t` from the first kept sample.
 #[derive(Debug)]
 struct ElectricalHum {
     /// Angular frequency in rad/s.
@@ -54,7 +54,8 @@ impl Extension for ElectricalHum {
     fn measure(&self, measured: &mut Measured) {
         let per_sample = self.omega * measured.time_step_s;
         for (index, value) in measured.acceleration_m_s2.iter_mut().enumerate() {
-            *value += self.amplitude_m_s2 * (per_sample * index as f64 + self.phase_rad).sin();
+            let samples = index as f64 - measured.first as f64;
+            *value += self.amplitude_m_s2 * (per_sample * samples + self.phase_rad).sin();
         }
     }
 }
@@ -71,11 +72,12 @@ mod tests {
             time_step_s: 1e-3,
             acceleration_m_s2: vec![1.0; 40],
             position_m: vec![0.0; 40],
+            first: 2,
         };
         hum.measure(&mut measured);
         // 50 Hz: a quarter of a wave is five samples.
         let at = |index: usize| measured.acceleration_m_s2[index];
-        for (index, expected) in [(0, 1.0), (5, 1.5), (15, 0.5), (25, 1.5)] {
+        for (index, expected) in [(2, 1.0), (7, 1.5), (17, 0.5), (27, 1.5)] {
             assert!((at(index) - expected).abs() < 1e-9, "{index}: {}", at(index));
         }
     }

@@ -80,7 +80,7 @@ pub enum InstanceError {
     #[error(
         "{physics}: its place must be {form}, on the track of {length_m} m and {sleepers} sleepers"
     )]
-    ReceptancePoint {
+    Place {
         /// Name of the kind.
         physics: String,
         /// Required form of the place.
@@ -259,7 +259,7 @@ impl Inputs<'_> {
         if fits {
             return Ok(());
         }
-        Err(InstanceError::ReceptancePoint {
+        Err(InstanceError::Place {
             physics: self.kind.physics.to_owned(),
             form: self.kind.place.form(),
             length_m: self.length_m(),

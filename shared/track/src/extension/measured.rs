@@ -13,6 +13,8 @@ pub struct Measured {
     pub acceleration_m_s2: Vec<f64>,
     /// Position of the wheel along the track in m at each sample.
     pub position_m: Vec<f64>,
+    /// Index of the first sample that is kept. The samples before it are the run-in.
+    pub first: usize,
 }
 
 impl Measured {

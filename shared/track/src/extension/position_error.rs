@@ -40,7 +40,7 @@ pub(super) const KIND: Kind = Kind {
     },
 };
 
-/// `x_0 + offset + (1 + scale) (x - x_0)`, with `x_0` the first true position.
+/// `x_0 + offset + (1 + scale) (x - x_0)`, with `x_0` the true position at the first kept sample.
 #[derive(Debug)]
 struct PositionError {
     offset_m: f64,
@@ -49,7 +49,7 @@ struct PositionError {
 
 impl Extension for PositionError {
     fn measure(&self, measured: &mut Measured) {
-        let first = measured.position_m.first().copied().unwrap_or_default();
+        let first = measured.position_m.get(measured.first).copied().unwrap_or_default();
         for position in &mut measured.position_m {
             *position = first + self.offset_m + (1.0 + self.scale) * (*position - first);
         }
@@ -67,11 +67,12 @@ mod tests {
         let mut measured = Measured {
             time_step_s: 1e-5,
             acceleration_m_s2: vec![1.0; 3],
-            position_m: vec![1.0, 1.5, 2.0],
+            position_m: vec![0.5, 1.0, 1.5],
+            first: 1,
         };
         extension(&error).measure(&mut measured);
         assert_eq!(measured.acceleration_m_s2, [1.0; 3]);
-        for (found, expected) in measured.position_m.iter().zip([1.01, 1.56, 2.11]) {
+        for (found, expected) in measured.position_m.iter().zip([0.46, 1.01, 1.56]) {
             assert!((found - expected).abs() < 1e-12, "{found}");
         }
     }

@@ -84,6 +84,7 @@ mod tests {
                 time_step_s: 1e-5,
                 acceleration_m_s2: (0..20_000).map(|index| phase(index).sin()).collect(),
                 position_m: vec![0.0; 20_000],
+                first: 0,
             };
             mount.measure(&mut measured);
             // Tenths of a second from either end: the filter has rung itself out.

@@ -7,6 +7,9 @@ use super::ExtensionInstance;
 use std::collections::BTreeMap;
 use std::str::FromStr;
 
+/// Largest number of a sleeper, beyond every track, so that a wrong range does not fill the memory.
+const LARGEST: usize = 1_000_000;
+
 /// Why a text does not describe an extension.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum InstanceTextError {
@@ -27,7 +30,7 @@ pub enum InstanceTextError {
         "`{0}` is not a place; write `2.43m`, `2m-3m`, `SN18`, `SN10-SN30`, `SN10-SN30/4` \
              or several sleepers separated by commas"
     )]
-    ReceptancePoint(String),
+    Place(String),
 }
 
 impl FromStr for ExtensionInstance {
@@ -70,13 +73,16 @@ fn stretch(text: &str) -> Result<[f64; 2], InstanceTextError> {
     let (from, to) = text.split_once('-').unwrap_or((text, text));
     match (metres(from), metres(to)) {
         (Ok(from), Ok(to)) => Ok([from, to]),
-        _ => Err(InstanceTextError::ReceptancePoint(text.to_owned())),
+        _ => Err(InstanceTextError::Place(text.to_owned())),
     }
 }
 
 fn sleepers(text: &str) -> Result<Vec<usize>, InstanceTextError> {
-    let wrong = || InstanceTextError::ReceptancePoint(text.to_owned());
-    let number = |id: &str| id.strip_prefix("SN").and_then(|digits| digits.parse::<usize>().ok());
+    let wrong = || InstanceTextError::Place(text.to_owned());
+    let number = |id: &str| {
+        let number = id.strip_prefix("SN").and_then(|digits| digits.parse::<usize>().ok());
+        number.filter(|&number| number <= LARGEST)
+    };
     let mut sleepers: Vec<usize> = Vec::new();
     for part in text.split(',') {
         let (range, step) = part.split_once('/').unwrap_or((part, "1"));
@@ -124,6 +130,7 @@ mod tests {
         assert!(refusal("squat:depth_m=1,depth_m=2").contains("duplicate"));
         assert!(refusal("squat@here").contains("`here`"));
         assert!(refusal("sleeper_bolt@SN9-SN3").contains("`SN9-SN3`"));
+        assert!(refusal("sleeper_bolt@SN1-SN99999999999").contains("is not a place"));
         assert!(refusal("sleeper_bolt@SN3-SN9/0").contains("SN10-SN30/4"));
     }
 }
