@@ -33,7 +33,7 @@ pub fn hammer_page(
             @for compared in compared { p { (capital(&compared.sentence())) } }
         }
         h2 { "Along the track" }
-        (figure(&charts(record, loaded.map(|it| it.0)), "Estimate at every sleeper with its 90 % interval (paper, Fig. 23). Hollow dots: not valid, the track model does not explain the receptances. Dashed grey: evaluation of a recording, under the load of the wheel."))
+        (figure(&charts(record, loaded.map(|it| it.0)), "Estimate at every sleeper with its 90 % interval (paper, Fig. 23). Hollow dots: not valid. Dashed grey: evaluation of a recording, under the load of the wheel."))
         h2 { "Estimates" }
         p.note { "Estimate with its 90 % interval. In brackets: the test does not tell the value, the interval is more than half as wide as before the test. Mean of all: the test does not tell this sleeper apart, the value is close to the mean of all sleepers. Rows in italics are not valid. Misfit: mean square of the residuals over its expectation. Railpad stiffness is that without the load of a wheel." }
         div.scroll { (table(record)) }
@@ -206,7 +206,7 @@ fn provenance(record: &HammerRecord, loaded: Option<&Loaded>, command: &str) -> 
 mod tests {
     use super::*;
     use std::collections::BTreeMap;
-    use tracktwin_hammer::SleeperFlag;
+    use tracktwin_hammer::{Gain, SleeperFlag};
 
     fn sleeper(number: u32, own: bool, flags: Vec<SleeperFlag>) -> Sleeper {
         let interval = Interval { estimate: 8e7, lower: 7e7, upper: 9e7, resolved: true, own };
@@ -238,6 +238,7 @@ mod tests {
             track: "V-Track".to_owned(),
             receptances: 5,
             range_hz: [100.0, 4000.0],
+            gain: Gain { estimate: 1.0, lower: 0.9, upper: 1.1, is_far: false },
             model_error_db: 0.4,
             unevenness: BTreeMap::new(),
             prior: BTreeMap::new(),

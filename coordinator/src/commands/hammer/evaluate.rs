@@ -269,7 +269,7 @@ fn print(record: &HammerRecord, said: &[String], compared: &[Beside], folder: &P
 fn summary(record: &HammerRecord, compared: &[Beside], folder: &Path) -> serde_json::Value {
     json!({
         "sleepers": record.sleepers.len(), "receptances": record.receptances,
-        "model_error_dB": record.model_error_db, "notes": record.notes,
+        "gain": record.gain, "model_error_dB": record.model_error_db, "notes": record.notes,
         "under_load": compared.iter().map(Beside::sentence).collect::<Vec<_>>(),
         "report": folder.join(PAGE).display().to_string(),
     })

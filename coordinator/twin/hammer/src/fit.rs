@@ -12,12 +12,10 @@ use tracktwin_track::model::ModelError;
 /// an octave.
 const ALIKE: f64 = 8.0;
 
-/// Standard deviation of the model error at a frequency in nats, as prior value and minimum: 0.4 dB, the
-/// difference between two simulators of one track.
+/// Expected standard deviation of the model error at a frequency in nats: 0.4 dB, the difference between
+/// two simulators of one track. It is the smallest estimate of the model error, and the misfits are judged
+/// by it.
 const MODEL_ERROR: f64 = 0.05;
-/// Largest standard deviation of the model error, in nats, for the judgement of misfits: 1.7 dB. The track
-/// model does not explain larger residuals.
-const MODEL_ERROR_MAX: f64 = 0.2;
 
 /// Two receptances within this distance in m count as one position.
 const SAME_PLACE_M: f64 = 1e-3;
@@ -120,14 +118,14 @@ pub fn fit(
             unknowns.learn(&values, &covariance.diagonal());
         }
     }
-    let misfits = misfits(&forward, &unknowns, &values, model_error.min(MODEL_ERROR_MAX))?;
+    let point_misfits = misfits(&forward, &unknowns, &values)?;
     Ok(Fitted {
         layout: forward.layout().clone(),
         unknowns,
         values,
         covariance,
         model_error,
-        point_misfits: misfits,
+        point_misfits,
     })
 }
 
@@ -164,7 +162,7 @@ fn best_start(forward: &Forward<'_>, unknowns: &Unknowns) -> Result<DVector<f64>
             for (of, way) in moved {
                 start[Unknowns::mean(of)] += way * unknowns.prior_deviation(of);
             }
-            let solved = solve.minimise(start, START_STEPS, |it| it < Quantity::COUNT)?;
+            let solved = solve.minimise(start, START_STEPS, |it| it < Unknowns::SHARED)?;
             if best.as_ref().is_none_or(|best| solved.objective < best.objective) {
                 best = Some(solved);
             }
@@ -201,18 +199,18 @@ fn error_of_model(
     Ok((sum / f64::max(count, 1.0)).max(MODEL_ERROR * MODEL_ERROR).sqrt())
 }
 
-/// Position of each point in m, and the mean square of its residuals divided by its expectation.
+/// Position of each point in m, and the mean square of its residuals divided by its expectation, the sum of
+/// the variances of the measurement and of the expected model error.
 fn misfits(
     forward: &Forward<'_>,
     unknowns: &Unknowns,
     values: &DVector<f64>,
-    model_error: f64,
 ) -> Result<Vec<(f64, f64)>, FitError> {
     let residuals = forward.residuals(unknowns, values)?;
     let of = |(residual, point): (&DVector<f64>, &PointReceptance)| {
         let lines = point.values.len();
         let expected =
-            |row: usize| point.deviation(row % lines).powi(2) + model_error * model_error;
+            |row: usize| point.deviation(row % lines).powi(2) + MODEL_ERROR * MODEL_ERROR;
         let squares = residual.iter().enumerate().map(|(row, value)| value * value / expected(row));
         (point.position_m, squares.sum::<f64>() / residual.len().max(1) as f64)
     };
@@ -334,6 +332,12 @@ impl Solve<'_> {
 }
 
 impl Fitted {
+    /// Logarithm of the gain of the measurement, and its standard deviation.
+    pub(crate) fn gain(&self) -> (f64, f64) {
+        let variance = self.covariance[(Unknowns::GAIN, Unknowns::GAIN)];
+        (self.values[Unknowns::GAIN], variance.max(0.0).sqrt())
+    }
+
     /// Logarithm of a quantity at the reported sleeper `index`, and its standard deviation.
     pub(crate) fn logarithm(&self, of: Quantity, index: usize) -> (f64, f64) {
         let (mean, own) = (Unknowns::mean(of), self.unknowns.at(of, Layout::own_index(index)));

@@ -1,4 +1,5 @@
-//! Prediction of a hammer test by the track model: logarithms of receptances, and their derivatives.
+//! Prediction of a hammer test by the track model and the gain of the measurement: logarithms of
+//! receptances, and their derivatives.
 
 use crate::layout::Layout;
 use crate::measured::PointReceptance;
@@ -31,7 +32,7 @@ pub(crate) struct Forward<'a> {
 ///
 /// The rows hold the real parts at all frequencies, then the imaginary parts. A residual is the logarithm
 /// of the ratio of measured to predicted receptance: its real part is the difference of the log magnitudes
-/// in nats, its imaginary part is the difference of the phases in rad.
+/// in nats, its imaginary part is the difference of the phases in rad. The prediction contains the gain.
 pub(crate) struct PointResidual {
     pub(crate) residual: DVector<f64>,
     /// Derivatives of the predicted logarithm, one column for each of `unknowns`.
@@ -85,7 +86,7 @@ impl<'a> Forward<'a> {
         let of = |(point, places): (&PointReceptance, &Vec<usize>)| {
             let nodes = shares(nodes_m, point.position_m - self.layout.origin_m());
             let predicted = |&place: &usize| direct(&rail.direct[place], &nodes);
-            residual(point, places.iter().map(predicted))
+            residual(point, values[Unknowns::GAIN], places.iter().map(predicted))
         };
         Ok(self.points.iter().zip(&self.places).map(of).collect())
     }
@@ -107,18 +108,16 @@ impl<'a> Forward<'a> {
         let nodes_m = model.layout().rail_nodes_m();
         let of = |(point, places): (&PointReceptance, &Vec<usize>)| {
             let nodes = shares(nodes_m, point.position_m - self.layout.origin_m());
-            Self::point(point, places, &nodes, &rail, &variations, unknowns)
+            let log_gain = values[Unknowns::GAIN];
+            Self::point(point, log_gain, places, &nodes, &rail, &variations, unknowns)
         };
         let mut all: Vec<PointResidual> = self.points.iter().zip(&self.places).map(of).collect();
         for mean in Quantity::ALL.map(Unknowns::mean) {
             let mut moved = values.clone();
             moved[mean] += STEP;
             for (point, moved) in all.iter_mut().zip(self.residuals(unknowns, &moved)?) {
-                let column = point.unknowns.iter().position(|unknown| *unknown == mean);
-                if let Some(column) = column {
-                    let derivative = (&point.residual - moved) / STEP;
-                    point.jacobian.set_column(column, &derivative);
-                }
+                let derivative = (&point.residual - moved) / STEP;
+                point.jacobian.set_column(mean, &derivative);
             }
         }
         Ok(all)
@@ -146,8 +145,10 @@ impl<'a> Forward<'a> {
         Quantity::ALL.into_iter().map(of).collect()
     }
 
+    /// Residual and derivatives of a point. The columns of the shared unknowns have their indices.
     fn point(
         point: &PointReceptance,
+        log_gain: f64,
         places: &[usize],
         nodes: &[(usize, f64)],
         rail: &RailReceptances,
@@ -164,9 +165,7 @@ impl<'a> Forward<'a> {
             |seat: usize| seat.checked_sub(Layout::first_own()).filter(|it| *it < unknowns.own);
         let owners: Vec<usize> = near.iter().copied().filter_map(own).collect();
         let first_owner = owners.first().copied().unwrap_or_default();
-        let columns: Vec<usize> = Quantity::ALL
-            .into_iter()
-            .map(Unknowns::mean)
+        let columns: Vec<usize> = (0..Unknowns::SHARED)
             .chain(
                 Quantity::ALL
                     .into_iter()
@@ -177,6 +176,7 @@ impl<'a> Forward<'a> {
         let mut jacobian = DMatrix::zeros(2 * lines, columns.len());
         for (line, &place) in places.iter().enumerate() {
             let predicted = direct(&rail.direct[place], nodes);
+            jacobian[(line, Unknowns::GAIN)] = 1.0;
             for &seat in &near {
                 let receptances = &rail.from_seats[place][seat];
                 // As the point receptance is taken between two nodes.
@@ -184,22 +184,23 @@ impl<'a> Forward<'a> {
                     let between = receptances.values[node - receptances.first];
                     share * between * between
                 };
-                let gain = -nodes.iter().map(square).sum::<Complex64>() / predicted;
+                let factor = -nodes.iter().map(square).sum::<Complex64>() / predicted;
                 for (quantity, variation) in variations.iter().enumerate() {
-                    let derivative = gain * variation[place][seat];
+                    let derivative = factor * variation[place][seat];
                     let mut add = |column: usize| {
                         jacobian[(line, column)] += derivative.re;
                         jacobian[(lines + line, column)] += derivative.im;
                     };
                     add(quantity);
                     if let Some(owner) = own(seat) {
-                        add(Quantity::COUNT + quantity * owners.len() + owner - first_owner);
+                        add(Unknowns::SHARED + quantity * owners.len() + owner - first_owner);
                     }
                 }
             }
         }
         let predicted = places.iter().map(|&place| direct(&rail.direct[place], nodes));
-        PointResidual { residual: residual(point, predicted), jacobian, unknowns: columns }
+        let residual = residual(point, log_gain, predicted);
+        PointResidual { residual, jacobian, unknowns: columns }
     }
 }
 
@@ -210,13 +211,14 @@ fn direct(line: &[Complex64], nodes: &[(usize, f64)]) -> Complex64 {
 
 fn residual(
     point: &PointReceptance,
+    log_gain: f64,
     predicted: impl ExactSizeIterator<Item = Complex64>,
 ) -> DVector<f64> {
     let lines = predicted.len();
     let mut residual = DVector::zeros(2 * lines);
     for (line, (measured, predicted)) in point.values.iter().zip(predicted).enumerate() {
         let logarithm = (measured / predicted).ln();
-        residual[line] = logarithm.re;
+        residual[line] = logarithm.re - log_gain;
         residual[lines + line] = logarithm.im;
     }
     residual
@@ -242,10 +244,11 @@ mod tests {
         let layout = Layout::new(&design, 1.0, struck).unwrap();
         let forward = Forward::new(&design, layout, &points);
         let unknowns = Unknowns::new(&Prior::v_track(), forward.layout().own());
-        let values = unknowns.start();
+        let mut values = unknowns.start();
+        values[Unknowns::GAIN] = 0.1;
         let linearised = forward.linearised(&unknowns, &values).unwrap();
         let step = 1e-4;
-        let mut moved = vec![Unknowns::mean(Quantity::RailpadDamping)];
+        let mut moved = vec![Unknowns::GAIN, Unknowns::mean(Quantity::RailpadDamping)];
         moved.extend(Quantity::ALL.map(|of| unknowns.at(of, 1)));
         moved.extend(
             [Quantity::BallastStiffness, Quantity::SleeperBendingStiffness].map(Unknowns::mean),

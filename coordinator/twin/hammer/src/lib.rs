@@ -20,6 +20,6 @@ pub use fit::{FitError, Fitted, fit};
 pub use layout::{Layout, LayoutError, SLEEPERS_MAX};
 pub use measured::{COHERENCE_MIN, PointReceptance, Selected, Selection, select};
 pub use read::{Nodes, ReadError, ReadFault, read};
-pub use record::{FORMAT, HammerRecord, Interval, Sleeper, SleeperFlag};
+pub use record::{FORMAT, Gain, HammerRecord, Interval, Sleeper, SleeperFlag};
 pub use simulate::{HammerTest, SimulateError, table, truth};
 pub use unknowns::Quantity;

@@ -1,7 +1,7 @@
 //! Record of the estimates of a hammer test, from which files and pages are made.
 
 use crate::fit::Fitted;
-use crate::unknowns::Quantity;
+use crate::unknowns::{GAIN_DEVIATION, Quantity};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use tracktwin_number::NORMAL_90;
@@ -20,6 +20,10 @@ const OWN: f64 = 0.8;
 /// model does not explain the receptances.
 const MISFIT_MAX: f64 = 4.0;
 
+/// The gain is far from one if the logarithm of its estimate exceeds this number of the standard deviations
+/// that the prior predicts for it; by chance one record in 370 does.
+const GAIN_FAR: f64 = 3.0;
+
 /// The estimates of a hammer test.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct HammerRecord {
@@ -34,6 +38,8 @@ pub struct HammerRecord {
     /// Lowest and highest fitted frequency in Hz.
     #[serde(rename = "range_Hz")]
     pub range_hz: [f64; 2],
+    /// Gain of the measurement, estimated from the test.
+    pub gain: Gain,
     /// Standard deviation of the model error in dB, estimated from the test.
     #[serde(rename = "model_error_dB")]
     pub model_error_db: f64,
@@ -47,6 +53,20 @@ pub struct HammerRecord {
     pub notes: Vec<String>,
 }
 
+/// Ratio of measured to true receptance, common to the whole test, with its 90 % interval.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Gain {
+    /// Median of the posterior.
+    pub estimate: f64,
+    /// Lower end of the 90 % interval.
+    pub lower: f64,
+    /// Upper end of the 90 % interval.
+    pub upper: f64,
+    /// Whether the gain is farther from one than the error of a calibration; the calibration or the rail of
+    /// the track file is wrong then, and no estimate of the test is valid.
+    pub is_far: bool,
+}
+
 /// Estimates of one sleeper.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Sleeper {
@@ -57,8 +77,8 @@ pub struct Sleeper {
     /// Estimates by parameter.
     #[serde(flatten)]
     pub estimates: BTreeMap<Parameter, Interval>,
-    /// Mean square of the residuals of the sleeper's receptances, divided by its expectation; about one if
-    /// the track model is valid. `None` if there was no hit near the sleeper.
+    /// Mean square of the residuals of the sleeper's receptances, divided by its expectation for a model
+    /// error of 0.4 dB; about one if the track model is valid. `None` if there was no hit near the sleeper.
     pub misfit: Option<f64>,
     /// Flags of the estimates.
     pub flags: Vec<SleeperFlag>,
@@ -72,6 +92,8 @@ pub enum SleeperFlag {
     NotStruck,
     /// The track model does not explain the receptances of the sleeper; the estimates are not valid.
     Unexplained,
+    /// The gain of the test is far from one; the estimates of all sleepers are not valid.
+    Calibration,
 }
 
 /// An estimate with its 90 % interval, in SI units.
@@ -88,6 +110,35 @@ pub struct Interval {
     pub resolved: bool,
     /// Whether the test resolves the sleeper's deviation from the mean of all sleepers.
     pub own: bool,
+}
+
+impl Gain {
+    /// Gain from the mean and the standard deviation of its logarithm.
+    fn new(logarithm: f64, deviation: f64) -> Self {
+        let Interval { estimate, lower, upper, .. } = Interval::new(logarithm, deviation);
+        let posterior = deviation.powi(2);
+        // A test that does not tell the gain cannot find it far from one.
+        let predicted = (GAIN_DEVIATION.powi(2) - posterior).max(posterior);
+        let is_far = logarithm.powi(2) > GAIN_FAR.powi(2) * predicted;
+        Self { estimate, lower, upper, is_far }
+    }
+
+    /// The gain in a sentence.
+    fn sentence(&self) -> String {
+        let Self { estimate, lower, upper, is_far } = self;
+        let numbers = format!(
+            "The measured receptances are {estimate:.3} times the true ones (90 % interval {lower:.3} to \
+             {upper:.3})"
+        );
+        if *is_far {
+            format!(
+                "{numbers}; that is far from 1: check the calibration of hammer and accelerometer, and the \
+                 rail of the track file. The estimates are not valid."
+            )
+        } else {
+            format!("{numbers}; the estimates allow for that.")
+        }
+    }
 }
 
 impl Interval {
@@ -112,7 +163,9 @@ impl Interval {
 impl Sleeper {
     /// Whether the estimates are valid.
     pub fn is_valid(&self) -> bool {
-        !self.flags.contains(&SleeperFlag::Unexplained)
+        let is_invalid =
+            |flag| matches!(flag, &SleeperFlag::Unexplained | &SleeperFlag::Calibration);
+        !self.flags.iter().any(is_invalid)
     }
 }
 
@@ -122,6 +175,7 @@ impl SleeperFlag {
         match self {
             Self::NotStruck => "not_struck",
             Self::Unexplained => "unexplained",
+            Self::Calibration => "calibration",
         }
     }
 }
@@ -137,10 +191,12 @@ impl HammerRecord {
         names: impl Fn(i64, f64) -> String,
     ) -> Self {
         let unknowns = &fitted.unknowns;
+        let (logarithm, deviation) = fitted.gain();
+        let gain = Gain::new(logarithm, deviation);
         let numbers = (0..fitted.layout.reported).zip(fitted.layout.first..);
         let sleepers = numbers.map(|(index, number)| {
             let x_m = fitted.layout.place_m(number);
-            Sleeper { id: names(number, x_m), x_m, ..fitted.sleeper(index) }
+            Sleeper { id: names(number, x_m), x_m, ..fitted.sleeper(index, gain.is_far) }
         });
         let sleepers: Vec<Sleeper> = sleepers.collect();
         let unevenness = Quantity::LEARNED
@@ -155,6 +211,7 @@ impl HammerRecord {
             track: track.to_owned(),
             receptances,
             range_hz,
+            gain,
             model_error_db: 20.0 / std::f64::consts::LN_10 * fitted.model_error,
             unevenness,
             prior: Quantity::ALL.map(prior).into_iter().collect(),
@@ -165,14 +222,14 @@ impl HammerRecord {
         record
     }
 
-    /// Sentences on receptances that the model does not explain and on values that the test does not
-    /// resolve.
+    /// Sentences on the gain, on receptances that the model does not explain and on values that the test
+    /// does not resolve.
     fn sentences(&self) -> Vec<String> {
         let flagged = |flag: SleeperFlag| -> Vec<&str> {
             let all = self.sleepers.iter().filter(|sleeper| sleeper.flags.contains(&flag));
             all.map(|sleeper| sleeper.id.as_str()).collect()
         };
-        let mut sentences = Vec::new();
+        let mut sentences = vec![self.gain.sentence()];
         let unexplained = flagged(SleeperFlag::Unexplained);
         if !unexplained.is_empty() {
             sentences.push(format!(
@@ -206,8 +263,8 @@ impl HammerRecord {
 }
 
 impl Fitted {
-    /// A reported sleeper without id and position.
-    fn sleeper(&self, index: usize) -> Sleeper {
+    /// A reported sleeper without id and position; `is_far` states whether the gain is far from one.
+    fn sleeper(&self, index: usize, is_far: bool) -> Sleeper {
         let estimate = |of: Quantity| {
             let (logarithm, deviation) = self.logarithm(of, index);
             let interval = Interval {
@@ -218,17 +275,35 @@ impl Fitted {
             (of.parameter(), interval)
         };
         let misfit = self.misfit(index);
-        let flags = match misfit {
+        let mut flags = match misfit {
             None => vec![SleeperFlag::NotStruck],
             Some(misfit) if misfit > MISFIT_MAX => vec![SleeperFlag::Unexplained],
             Some(_) => Vec::new(),
         };
+        flags.extend(is_far.then_some(SleeperFlag::Calibration));
         Sleeper {
             id: String::new(),
             x_m: 0.0,
             estimates: Quantity::ALL.map(estimate).into_iter().collect(),
             misfit,
             flags,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_gain_that_the_test_tells_is_far() {
+        // The third is drawn to one by the prior, the last is the prior itself.
+        for (logarithm, deviation, is_far) in
+            [(0.10, 0.01, false), (-0.20, 0.01, true), (0.13, 0.03, true), (0.05, 0.05, false)]
+        {
+            let gain = Gain::new(logarithm, deviation);
+            assert_eq!(gain.is_far, is_far, "{gain:?}");
+            assert_eq!(gain.sentence().contains("check the calibration"), is_far, "{gain:?}");
         }
     }
 }

@@ -1,4 +1,5 @@
-//! Unknown logarithms of a track: means, and the deviation of each sleeper from the means.
+//! Unknown logarithms: means of a track, the deviation of each sleeper from the means, and the gain of the
+//! measurement.
 
 use nalgebra::DVector;
 use tracktwin_parameters::{Parameter, Prior};
@@ -13,6 +14,13 @@ const UNEVENNESS_WEIGHT: f64 = 4.0;
 
 /// Lower and upper limit of the estimated unevenness.
 const UNEVENNESS_ENDS: [f64; 2] = [0.01, 1.0];
+
+/// Prior standard deviation of the logarithm of the gain: 5 %.
+///
+/// The gain is the ratio of measured to true receptance, common to the whole record. It is the error of
+/// the calibration of hammer and accelerometer. Each is calibrated to a few per cent; ISO 7626-5 measures
+/// the ratio of both on a known mass.
+pub(crate) const GAIN_DEVIATION: f64 = 0.05;
 
 /// Estimated quantity of a sleeper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -70,8 +78,8 @@ impl Quantity {
 
 /// Indices of the unknowns, and their priors.
 ///
-/// The vector begins with the logarithms of the means. For every quantity, the logarithm of the ratio of
-/// each sleeper's value to the mean follows.
+/// The vector begins with the logarithms of the means and of the gain. For every quantity, the logarithm of
+/// the ratio of each sleeper's value to the mean follows.
 #[derive(Clone, Debug)]
 pub(crate) struct Unknowns {
     /// Number of sleepers with their own values.
@@ -83,6 +91,12 @@ pub(crate) struct Unknowns {
 }
 
 impl Unknowns {
+    /// Index of the gain.
+    pub(crate) const GAIN: usize = Quantity::COUNT;
+
+    /// Number of unknowns that all sleepers share: means and gain. They have the first indices.
+    pub(crate) const SHARED: usize = Quantity::COUNT + 1;
+
     pub(crate) fn new(prior: &Prior, own: usize) -> Self {
         Self {
             own,
@@ -93,7 +107,7 @@ impl Unknowns {
     }
 
     pub(crate) const fn count(&self) -> usize {
-        Quantity::COUNT * (1 + self.own)
+        Self::SHARED + Quantity::COUNT * self.own
     }
 
     /// Index of the mean of a quantity.
@@ -103,7 +117,7 @@ impl Unknowns {
 
     /// Index of the deviation of a sleeper from the mean.
     pub(crate) const fn at(&self, of: Quantity, own: usize) -> usize {
-        Quantity::COUNT + of as usize * self.own + own
+        Self::SHARED + of as usize * self.own + own
     }
 
     /// Prior median of every unknown.
@@ -118,6 +132,7 @@ impl Unknowns {
     /// Prior reciprocal variance of every unknown.
     pub(crate) fn precision(&self) -> DVector<f64> {
         let mut precision = DVector::zeros(self.count());
+        precision[Self::GAIN] = GAIN_DEVIATION.powi(-2);
         for of in Quantity::ALL {
             precision[Self::mean(of)] = self.deviations[of as usize].powi(-2);
             for own in 0..self.own {
