@@ -17,12 +17,14 @@ const ROOM: f64 = 284.0;
 const LETTER: f64 = 7.4;
 const KEY: f64 = 36.0;
 
-/// Returns the HTML page of a reproduction: one sentence, a table of all rows, one chart per figure.
-pub fn reproduction_page(reproduction: &Reproduction) -> String {
+/// Returns the HTML page of a reproduction: a summary, a table of all rows, and the charts by figure;
+/// `command` is the command line that repeats it.
+pub fn reproduction_page(reproduction: &Reproduction, command: &str) -> String {
     let of = &reproduction.provenance;
     let body = html! {
         p.note { "Shen et al. 2023, Mechanical Systems and Signal Processing 204, 110730. Each \
-             verdict follows from the stated tolerance." }
+             verdict follows from the stated tolerance. Rows that hold, fail or are undecided are checks \
+             of the program, not statements of the paper." }
         @for compared in &reproduction.figures { (section(compared)) }
         h2 { "Provenance" }
         dl {
@@ -31,26 +33,30 @@ pub fn reproduction_page(reproduction: &Reproduction) -> String {
             dt { "program" } dd { "tracktwin " (of.code_version) }
         }
         p { "To reproduce, with the library of that digest:" }
-        pre { "tracktwin reproduce " (names(reproduction)) " --library URL --out DIR" }
+        pre { (command) }
     };
     page("Comparison with the paper's results", &summary(reproduction), &body)
 }
 
-/// Summary in one sentence.
+/// Summary: a sentence on the statements of the paper, and one on the checks of the program.
 fn summary(reproduction: &Reproduction) -> String {
-    let count = |verdict| reproduction.count(verdict);
-    format!(
+    let (count, checks) = (|verdict| reproduction.count(verdict), reproduction.checks());
+    let statements = format!(
         "Of {} statements of the paper, {} are reproduced, {} differ, and {} cannot be decided.",
-        reproduction.rows.len(),
+        reproduction.rows.len() - checks,
         count(ClaimVerdict::Reproduced),
         count(ClaimVerdict::Differs),
         count(ClaimVerdict::CannotTell)
+    );
+    if checks == 0 {
+        return statements;
+    }
+    format!(
+        "{statements} Of {checks} checks of the program, {} hold, {} fail, and {} are undecided.",
+        count(ClaimVerdict::Holds),
+        count(ClaimVerdict::Fails),
+        count(ClaimVerdict::Undecided)
     )
-}
-
-fn names(reproduction: &Reproduction) -> String {
-    let names: Vec<_> = reproduction.figures.iter().map(|of| of.figure.name()).collect();
-    names.join(" ")
 }
 
 fn section(compared: &Compared) -> Markup {
@@ -88,9 +94,9 @@ fn table(compared: &Compared) -> Markup {
 /// The verdict with a symbol, so that it can be read without colour.
 pub(crate) fn verdict(verdict: ClaimVerdict) -> Markup {
     let (mark, colour) = match verdict {
-        ClaimVerdict::Reproduced => ("✓", "var(--c)"),
-        ClaimVerdict::Differs => ("✗", "var(--b)"),
-        ClaimVerdict::CannotTell => ("?", "var(--dim)"),
+        ClaimVerdict::Reproduced | ClaimVerdict::Holds => ("✓", "var(--c)"),
+        ClaimVerdict::Differs | ClaimVerdict::Fails => ("✗", "var(--b)"),
+        ClaimVerdict::CannotTell | ClaimVerdict::Undecided => ("?", "var(--dim)"),
     };
     html! { strong style=(format!("color:{colour}")) { (mark) " " (verdict.label()) } }
 }
@@ -185,5 +191,46 @@ fn legend(chart: &mut Chart, picture: &Picture) {
             _ => CLASSES[index % CLASSES.len()],
         };
         chart.explain(class, &curve.name);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tracktwin_reproduction::{ClaimRow, Figure, Provenance};
+
+    fn page_of(figure: Figure, verdicts: &[ClaimVerdict]) -> String {
+        let row = |&verdict: &ClaimVerdict| ClaimRow {
+            figure,
+            claim: String::new(),
+            paper: String::new(),
+            ours: String::new(),
+            verdict,
+            why: String::new(),
+        };
+        let (rows, caption) = (verdicts.iter().map(row).collect(), String::new());
+        let provenance = Provenance {
+            code_version: "0.1.0",
+            campaign: "made-up".to_owned(),
+            library_digest: "0123abcd".to_owned(),
+            library_entries: 60,
+        };
+        let compared = Compared { figure, rows, pictures: Vec::new(), caption };
+        reproduction_page(&Reproduction::new(provenance, vec![compared]), "tracktwin reproduce")
+    }
+
+    #[test]
+    fn checks_of_the_program_are_no_statements_of_the_paper() {
+        use ClaimVerdict::{CannotTell, Differs, Fails, Holds, Reproduced, Undecided};
+        let page = page_of(
+            Figure::Fig19,
+            &[Reproduced, Holds, Holds, Fails, Undecided, Differs, CannotTell],
+        );
+        assert!(page.contains("Of 3 statements of the paper, 1 are reproduced, 1 differ, and 1"));
+        assert!(page.contains("Of 4 checks of the program, 2 hold, 1 fail, and 1 are undecided."));
+        assert!(
+            page.contains("✓ holds") && page.contains("✗ fails") && page.contains("? undecided")
+        );
+        assert!(!page_of(Figure::Fig19, &[Reproduced]).contains("Of 0 checks"));
     }
 }

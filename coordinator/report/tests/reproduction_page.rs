@@ -55,7 +55,8 @@ fn reproduction() -> Reproduction {
 
 #[test]
 fn the_page_shows_every_row_with_its_verdict_and_every_picture() {
-    let page = reproduction_page(&reproduction());
+    let command = "tracktwin reproduce fig17 --library sqlite:l --out o --models m --campaign c";
+    let page = reproduction_page(&reproduction(), command);
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("reproduce.html");
     std::fs::write(file, &page).expect("writable");
     assert!(page.contains("Of 3 statements of the paper, 1 are reproduced, 1 differ"));
@@ -68,7 +69,7 @@ fn the_page_shows_every_row_with_its_verdict_and_every_picture() {
     assert_eq!(page.matches("<rect class=\"bar").count(), 18);
     assert_eq!(page.matches("<polygon").count(), 1);
     assert_eq!(page.matches("<circle").count(), 9);
-    assert!(page.contains("tracktwin reproduce fig17 --library"));
+    assert!(page.contains(command));
 }
 
 #[test]
@@ -84,7 +85,7 @@ fn a_map_fills_its_frame_and_many_thin_lines_have_one_style() {
     shown.marks = vec![2.0, 3.0];
     let mut reproduction = reproduction();
     reproduction.figures[0].pictures = vec![shown, picture(vec![Style::Thin, Style::Thin])];
-    let page = reproduction_page(&reproduction);
+    let page = reproduction_page(&reproduction, "");
     assert!(page.contains("data:image/png;base64,"));
     // Left and right edge of the frame of 774 px.
     assert!(page.contains("M0.0 0V") && page.contains("M774.0 0V"), "{page}");
@@ -93,7 +94,7 @@ fn a_map_fills_its_frame_and_many_thin_lines_have_one_style() {
 
 #[test]
 fn the_page_needs_nothing_from_elsewhere() {
-    let page = reproduction_page(&reproduction()).replace("http://www.w3.org/2000/svg", "");
+    let page = reproduction_page(&reproduction(), "").replace("http://www.w3.org/2000/svg", "");
     assert!(!page.contains("http://") && !page.contains("https://") && !page.contains("<script"));
     assert!(!page.contains("NaN") && !page.contains("inf"), "{page}");
 }

@@ -250,7 +250,7 @@ async fn compare(
 
 /// Writes the files.
 fn write(reproduction: &Reproduction, out: &Path, force: Force) -> Result<(), FilesError> {
-    let page = tracktwin_report::reproduction_page(reproduction);
+    let page = tracktwin_report::reproduction_page(reproduction, &evaluate::command());
     let mut output = Output::begin(out, Kind::Results, force.force)?;
     output.add(&FileName::new(PAGE)?, page.as_bytes())?;
     output.add(&FileName::new(ANSWER)?, reproduction.json().as_bytes())?;
@@ -268,10 +268,12 @@ fn print(reproduction: &Reproduction, out: &Path) {
     }
     let count = |verdict| reproduction.count(verdict);
     println_stdout(&format!(
-        "{} reproduced, {} differ, {} cannot tell; page: {}",
+        "{} reproduced, {} differ, {} cannot tell; of {} checks of the program {} hold; page: {}",
         count(ClaimVerdict::Reproduced),
         count(ClaimVerdict::Differs),
         count(ClaimVerdict::CannotTell),
+        reproduction.checks(),
+        count(ClaimVerdict::Holds),
         out.join(PAGE).display()
     ));
 }

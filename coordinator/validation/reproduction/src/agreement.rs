@@ -24,6 +24,8 @@ pub(crate) struct Agreement {
     outside: usize,
     /// All of them.
     total: usize,
+    /// How many may lie beyond by chance. The errors of the sleepers of an example count as one.
+    allowed: usize,
     /// Mean absolute error, as a share of the range.
     error: f64,
     /// Mean standard deviation, as a share of the range.
@@ -43,6 +45,7 @@ impl Agreement {
         Self {
             outside: beyond.count(),
             total: pairs.len(),
+            allowed: allowed(told.len()) * sleepers.len(),
             error: pairs.iter().map(|(truth, of)| (of.mean - truth).abs()).sum::<f64>() / n,
             sd: pairs.iter().map(|(_, of)| of.sd).sum::<f64>() / n,
         }
@@ -51,7 +54,6 @@ impl Agreement {
     /// Adds the row of this claim.
     pub(crate) fn row(&self, compared: &mut Compared, claim: String, paper: &str) {
         let inside = self.total - self.outside;
-        let allowed = allowed(self.total);
         let ours = format!(
             "{inside} of {} within two standard deviations; mean error {:.1} %, mean standard \
              deviation {:.1} % of the range",
@@ -60,13 +62,14 @@ impl Agreement {
             100.0 * self.sd
         );
         let why = format!(
-            "chance alone leaves more than {allowed} of {} outside once in twenty times at most; \
-             estimates less sure than {:.0} % of the range, half of what knowing the range alone \
-             gives, agree with anything",
+            "the sleepers of an example share their error: chance alone leaves more than {} of {} \
+             outside once in twenty times at most; estimates less sure than {:.0} % of the range, \
+             half of what knowing the range alone gives, agree with anything",
+            self.allowed,
             self.total,
             100.0 * SURE
         );
-        let verdict = if self.outside > allowed {
+        let verdict = if self.outside > self.allowed {
             ClaimVerdict::Differs
         } else if self.sd > SURE {
             ClaimVerdict::CannotTell
@@ -120,11 +123,33 @@ pub(crate) fn picture(told: &EvaluatedExample, parameter: Parameter) -> Picture 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Figure;
+    use crate::testing::told;
+
+    #[test]
+    fn one_example_of_three_may_lie_outside_and_two_may_not() {
+        let row = |biased: usize| {
+            let parameter = Parameter::IrregularityLevel;
+            let mut told = told(Figure::Fig17, 0.02, |of, at, it| of.sleepers[at - 1][it]);
+            for sleeper in told[..biased].iter_mut().flat_map(|of| &mut of.sleepers) {
+                sleeper.get_mut(&parameter).unwrap().mean += 1.0;
+            }
+            let mut compared = Compared::new(Figure::Fig17, "");
+            let all: Vec<usize> = (1..=9).collect();
+            Agreement::new(&told, &all, parameter).row(&mut compared, String::new(), "");
+            compared.rows.remove(0)
+        };
+        assert_eq!(row(1).verdict, ClaimVerdict::Reproduced);
+        assert!(row(1).why.contains("more than 9 of 27"), "{}", row(1).why);
+        assert_eq!(row(2).verdict, ClaimVerdict::Differs);
+    }
 
     #[test]
     fn chance_leaves_a_few_outside() {
         // P(X = 0) of 20 is 0.39, up to 1 0.77, up to 2 0.94, up to 3 0.988.
         assert_eq!(allowed(20), 3);
+        // P(X = 0) of 3 is 0.87, up to 1 0.994.
+        assert_eq!(allowed(3), 1);
         assert_eq!(allowed(1), 0);
         assert_eq!(allowed(0), 0);
     }

@@ -25,15 +25,26 @@ impl Average {
         Self { mean, error: (squares / (n - 1.0) / n).sqrt() }
     }
 
-    /// Mean of estimates with independent errors of the stated size.
+    /// Mean of estimates from one recording. Most of their error is the same at all sleepers, so the
+    /// error of the mean is the mean standard deviation of one estimate.
     pub(crate) fn of_estimates(estimates: &[Estimate]) -> Self {
         let n = estimates.len() as f64;
         let mean = estimates.iter().map(|estimate| estimate.mean).sum::<f64>() / n;
-        let squares: f64 = estimates.iter().map(|estimate| estimate.sd.powi(2)).sum();
-        Self { mean, error: squares.sqrt() / n }
+        let error = estimates.iter().map(|estimate| estimate.sd).sum::<f64>() / n;
+        Self { mean, error }
     }
 
-    /// This less another that is independent of it.
+    /// Sum of averages that are independent of each other.
+    pub(crate) fn sum(averages: impl IntoIterator<Item = Self>) -> Self {
+        let zero = Self { mean: 0.0, error: 0.0 };
+        averages.into_iter().fold(zero, |sum, next| Self {
+            mean: sum.mean + next.mean,
+            error: sum.error.hypot(next.error),
+        })
+    }
+
+    /// This less another that is independent of it. If both share a part of their error, the error of
+    /// the difference is smaller than stated.
     pub(crate) fn less(self, other: Self) -> Self {
         Self { mean: self.mean - other.mean, error: self.error.hypot(other.error) }
     }
@@ -103,6 +114,16 @@ mod tests {
         assert_eq!(unsure.is_nothing(3.0), ClaimVerdict::Reproduced);
         assert_eq!(unsure.is_nothing(1.0), ClaimVerdict::CannotTell);
         assert_eq!(other.is_nothing(9.0), ClaimVerdict::Differs);
+    }
+
+    #[test]
+    fn sleepers_share_their_error_and_examples_do_not() {
+        let estimates =
+            [(1.0, 0.2), (2.0, 0.2), (3.0, 0.5)].map(|(mean, sd)| Estimate { mean, sd });
+        let mean = Average::of_estimates(&estimates);
+        assert!((mean.mean - 2.0).abs() < 1e-12 && (mean.error - 0.3).abs() < 1e-12);
+        let sum = Average::sum([mean; 4]);
+        assert!((sum.mean - 8.0).abs() < 1e-12 && (sum.error - 0.6).abs() < 1e-12);
     }
 
     #[test]

@@ -92,9 +92,6 @@ pub enum Error {
         /// Number of the sleeper, from 1.
         sleeper: usize,
     },
-    /// The receptance of the track cannot be computed.
-    #[error(transparent)]
-    Frequency(#[from] tracktwin_track::frequency::FrequencyError),
     /// Error of the model selector or a model.
     #[error(transparent)]
     Surrogate(#[from] tracktwin_surrogate::Error),

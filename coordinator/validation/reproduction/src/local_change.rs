@@ -58,7 +58,10 @@ fn one(compared: &mut Compared, told: &[EvaluatedExample], parameter: Parameter)
             format!("lower by {:.1} ± {:.1} MN/m, the truth by {true_dip:.0}", dip.mean, dip.error),
         ],
         dip.is_positive(),
-        format!("sleeper 4 against 1, 2 and 6 to 9, beyond two standard deviations; {TAKEN}"),
+        format!(
+            "sleeper 4 against 1, 2 and 6 to 9, beyond two standard deviations; sleepers share their \
+             error, so that of a mean is the standard deviation of one sleeper; {TAKEN}"
+        ),
     );
 }
 
@@ -88,12 +91,13 @@ fn closer(compared: &mut Compared, told: &[EvaluatedExample], parameter: Paramet
         ],
         size(first).less(size(last)).is_positive(),
         format!(
-            "error with one sleeper against that with five, beyond two standard deviations; {TAKEN}"
+            "error with one sleeper against that with five, beyond two standard deviations; sleepers \
+             share their error; {TAKEN}"
         ),
     );
 }
 
-/// Share of the true reduction that the inversion finds at the reduced sleepers.
+/// Share of the true reduction that the inversion finds at the reduced sleepers, a check of this program.
 fn recovered(compared: &mut Compared, inverted: &[EvaluatedExample], parameter: Parameter) {
     let shares: Vec<Average> = inverted
         .iter()
@@ -111,18 +115,20 @@ fn recovered(compared: &mut Compared, inverted: &[EvaluatedExample], parameter: 
         ClaimVerdict::Differs
     };
     let ours = shares.iter().map(|of| format!("{:.0} ± {:.0}", 100.0 * of.mean, 100.0 * of.error));
-    compared.row(
+    compared.check(
         format!(
-            "{} by inversion: the reduction is found at the reduced sleepers",
+            "{} by inversion: the true reduction is found at the reduced sleepers",
             parameter.symbol()
         ),
         [
-            "spread over the neighbours (section 4.3.2)".to_owned(),
+            "100 % (truth)".to_owned(),
             format!("{} % of the reduction", ours.collect::<Vec<_>>().join(", ")),
         ],
         verdict,
         format!(
-            "1, 3 and 5 sleepers, each within {:.0} % of the true reduction; {TAKEN}",
+            "1, 3 and 5 sleepers, each within {:.0} % of the true reduction. A comparison with the \
+             truth, not with the paper, whose estimates spread the reduction over the neighbours \
+             (section 4.3.2); {TAKEN}",
             100.0 * RECOVERED
         ),
     );
@@ -131,7 +137,7 @@ fn recovered(compared: &mut Compared, inverted: &[EvaluatedExample], parameter: 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ClaimVerdict::{CannotTell, Differs, Reproduced};
+    use crate::ClaimVerdict::{CannotTell, Differs, Fails, Holds, Reproduced};
     use crate::testing::{told, verdicts};
 
     fn smoothed(share: f64, sd: f64) -> Vec<EvaluatedExample> {
@@ -158,10 +164,10 @@ mod tests {
             local_change(&told)
         };
         let found = inverted(0.0);
-        assert_eq!(verdicts(&found), [Reproduced; 6]);
+        assert_eq!(verdicts(&found), [[Reproduced; 4].as_slice(), &[Holds; 2]].concat());
         assert!(found.rows[4].ours.starts_with("100 "), "{}", found.rows[4].ours);
         assert_eq!(found.pictures.len(), 12);
-        assert_eq!(verdicts(&inverted(0.25))[4..], [Differs; 2]);
+        assert_eq!(verdicts(&inverted(0.25))[4..], [Fails; 2]);
     }
 
     #[test]

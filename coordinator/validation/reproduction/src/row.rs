@@ -1,4 +1,4 @@
-//! Rows of a comparison, one per claim.
+//! Rows of a comparison: one per statement of the paper, and one per check of this program.
 
 use crate::{Figure, Picture};
 use serde::Serialize;
@@ -6,7 +6,7 @@ use serde::Serialize;
 /// The format of `reproduce.json`.
 pub const FORMAT: &str = "reproduction/1";
 
-/// Verdict on a claim.
+/// Verdict on a statement of the paper, or on a check of this program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ClaimVerdict {
@@ -16,6 +16,12 @@ pub enum ClaimVerdict {
     Differs,
     /// Undecided, because of chance or of information missing in the paper.
     CannotTell,
+    /// A check of this program: within the stated tolerance.
+    Holds,
+    /// A check of this program: beyond it.
+    Fails,
+    /// A check of this program: undecided because of chance.
+    Undecided,
 }
 
 impl ClaimVerdict {
@@ -24,24 +30,41 @@ impl ClaimVerdict {
         if yes { Self::Reproduced } else { Self::Differs }
     }
 
+    /// The same verdict as that on a check of this program.
+    const fn on_check(self) -> Self {
+        match self {
+            Self::Reproduced | Self::Holds => Self::Holds,
+            Self::Differs | Self::Fails => Self::Fails,
+            Self::CannotTell | Self::Undecided => Self::Undecided,
+        }
+    }
+
+    /// Whether this is a verdict on a check of this program, not on a statement of the paper.
+    pub const fn is_of_check(self) -> bool {
+        matches!(self, Self::Holds | Self::Fails | Self::Undecided)
+    }
+
     /// Text of the verdict for readers.
     pub const fn label(self) -> &'static str {
         match self {
             Self::Reproduced => "reproduced",
             Self::Differs => "differs",
             Self::CannotTell => "cannot tell",
+            Self::Holds => "holds",
+            Self::Fails => "fails",
+            Self::Undecided => "undecided",
         }
     }
 }
 
-/// A claim of the paper, compared with the result of this program.
+/// A statement of the paper compared with the result of this program, or a check of this program.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ClaimRow {
-    /// Figure that the claim belongs to.
+    /// Figure that the row belongs to.
     pub figure: Figure,
-    /// Statement of the paper.
+    /// Statement of the paper, or what is checked.
     pub claim: String,
-    /// Number or finding of the paper.
+    /// Number or finding of the paper; of a check what is expected.
     pub paper: String,
     /// Number or finding of this program.
     pub ours: String,
@@ -56,7 +79,7 @@ pub struct ClaimRow {
 pub struct Compared {
     /// The figure.
     pub figure: Figure,
-    /// One row per claim.
+    /// The rows.
     pub rows: Vec<ClaimRow>,
     /// Pictures of the results of this program, drawn like those of the paper.
     pub pictures: Vec<Picture>,
@@ -69,7 +92,7 @@ impl Compared {
         Self { figure, rows: Vec::new(), pictures: Vec::new(), caption: caption.to_owned() }
     }
 
-    /// Adds the row of a claim.
+    /// Adds the row of a statement of the paper.
     pub(crate) fn row(
         &mut self,
         claim: impl Into<String>,
@@ -79,6 +102,18 @@ impl Compared {
     ) {
         let (figure, claim, why) = (self.figure, claim.into(), why.into());
         self.rows.push(ClaimRow { figure, claim, paper, ours, verdict, why });
+    }
+
+    /// Adds the row of a check of this program: of its own inputs, against the truth, or of what no
+    /// statement of the paper says.
+    pub(crate) fn check(
+        &mut self,
+        what: impl Into<String>,
+        [expected, ours]: [String; 2],
+        verdict: ClaimVerdict,
+        why: impl Into<String>,
+    ) {
+        self.row(what, [expected, ours], verdict.on_check(), why);
     }
 }
 
@@ -103,7 +138,7 @@ pub struct Reproduction {
     /// Provenance of the results of this program.
     #[serde(flatten)]
     pub provenance: Provenance,
-    /// One row per claim, in the order of the paper.
+    /// All rows, in the order of the paper.
     pub rows: Vec<ClaimRow>,
     /// The figures with their pictures, for a page.
     #[serde(skip)]
@@ -122,9 +157,42 @@ impl Reproduction {
         self.rows.iter().filter(|row| row.verdict == verdict).count()
     }
 
+    /// Number of checks of this program; the other rows are statements of the paper.
+    pub fn checks(&self) -> usize {
+        self.rows.iter().filter(|row| row.verdict.is_of_check()).count()
+    }
+
     /// The record as the text of `reproduce.json`.
     pub fn json(&self) -> String {
         let text = serde_json::to_string_pretty(self).expect("rows of text become JSON");
         format!("{text}\n")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ClaimVerdict::{CannotTell, Differs, Fails, Holds, Reproduced, Undecided};
+    use super::*;
+
+    #[test]
+    fn checks_of_the_program_are_counted_apart_from_statements_of_the_paper() {
+        let mut compared = Compared::new(Figure::Fig19, "");
+        let texts = || [String::new(), String::new()];
+        for verdict in [Reproduced, Differs, CannotTell] {
+            compared.row("statement", texts(), verdict, "");
+            compared.check("check", texts(), verdict, "");
+        }
+        compared.check("check", texts(), Reproduced, "");
+        let provenance = Provenance {
+            code_version: "0",
+            campaign: String::new(),
+            library_digest: String::new(),
+            library_entries: 0,
+        };
+        let all = Reproduction::new(provenance, vec![compared]);
+        assert_eq!((all.rows.len(), all.checks()), (7, 4));
+        let counts = [Reproduced, Differs, CannotTell, Holds, Fails, Undecided];
+        assert_eq!(counts.map(|verdict| all.count(verdict)), [1, 1, 1, 2, 1, 1]);
+        assert!(all.json().contains(r#""verdict": "holds""#), "{}", all.json());
     }
 }

@@ -35,12 +35,8 @@ fn gradual(compared: &mut Compared, told: &[EvaluatedExample], parameter: Parame
     };
     let whole = |of: &EvaluatedExample| side(of, &BEFORE).less(side(of, &BEHIND));
     let between = |of: &EvaluatedExample| side(of, &[4]).less(side(of, &[5]));
-    let sum = |of: &dyn Fn(&EvaluatedExample) -> f64| told.iter().map(of).sum::<f64>();
-    let total = |of: &dyn Fn(&EvaluatedExample) -> Average| Average {
-        mean: sum(&|told| of(told).mean),
-        error: sum(&|told| of(told).error.powi(2)).sqrt(),
-    };
-    let (change, rest) = (total(&whole), total(&|of| whole(of).less(between(of))));
+    let change = Average::sum(told.iter().map(whole));
+    let rest = Average::sum(told.iter().map(|of| whole(of).less(between(of))));
     let share = 100.0 * (1.0 - rest.mean / change.mean);
     let size = 100.0 * rest.error / change.mean.abs();
     compared.row(
@@ -51,7 +47,8 @@ fn gradual(compared: &mut Compared, told: &[EvaluatedExample], parameter: Parame
         ],
         all([change.is_positive(), rest.is_positive()]),
         "all of the change between the two would be abrupt; less by more than two standard \
-         deviations of the estimates, over the three examples together",
+         deviations, over the three examples together; the sleepers of an example share their error, \
+         each example has a surface of its own",
     );
 }
 
