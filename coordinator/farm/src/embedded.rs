@@ -31,7 +31,7 @@ pub enum FarmError {
     Dispatch(#[from] DispatchError),
     /// Somebody paused or cancelled the campaign, or a coordinator did so because it cannot dispatch it.
     #[error(
-        "campaign {campaign} is {}, and its cases are not simulated; continue it with `tracktwin campaign resume {campaign}`",
+        "campaign {campaign} was {} meanwhile; its results are kept, and the same command continues it",
         .state.name()
     )]
     NotRunning {
@@ -118,8 +118,13 @@ pub async fn run_claimed(
     let dispatch = dispatch(library, claim, &task, own.holdings.clone()).await?;
     let config = agent::Config { prepare: task.prepare, ..own };
     let mut farm = Running::begin(dispatch, config, &shutdown).await?;
-    let ended = farm.watch(library, &task, &shutdown, &mut progress).await?;
-    farm.end(ended).await?;
+    let watched = farm.watch(library, &task, &shutdown, &mut progress).await;
+    if let Err(error @ FarmError::NotRunning { .. }) = watched {
+        // The results of what is in work are stored.
+        farm.end(None).await?;
+        return Err(error);
+    }
+    farm.end(watched?).await?;
     let status = library.status_of(task.campaign, task.cases).await?;
     progress(status);
     Ok(status)

@@ -31,22 +31,32 @@ fn troubled(experiment: &Experiment) -> Result<Box<dyn Simulate>, ExperimentErro
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_campaign_that_is_paused_or_cancelled_ends_the_run_with_the_remedy() {
-    let campaign = Campaign::built_in(Some(20)).unwrap();
+    let campaign = Campaign::built_in(Some(2000)).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let library = library(&folder, &campaign).await;
     let id = campaign.id();
-    let run = || {
-        let shutdown = CancellationToken::new();
-        embedded::run_embedded(&library, task(&id, campaign.cases), shutdown, |_| {})
-    };
-    library.pause(&id).await.unwrap();
-    let error = run().await.unwrap_err();
-    assert!(matches!(error, FarmError::NotRunning { .. }), "{error}");
-    assert!(error.to_string().contains(&format!("campaign resume {id}")), "{error}");
-    library.cancel(&id).await.unwrap();
-    assert!(run().await.unwrap_err().to_string().contains("cancelled"));
-    library.resume(&id).await.unwrap();
-    assert_eq!(run().await.unwrap().finished, 20);
+    // Each run begins by resuming the campaign; somebody stops it as soon as it is at work.
+    for (cancels, state) in [(false, "paused"), (true, "cancelled")] {
+        let (operator, stopped) = (library.clone(), id.clone());
+        let stop = move |_| {
+            let (operator, stopped) = (operator.clone(), stopped.clone());
+            tokio::spawn(async move {
+                let stop = if cancels {
+                    operator.cancel(&stopped).await
+                } else {
+                    operator.pause(&stopped).await
+                };
+                stop.unwrap();
+            });
+        };
+        let task = task(&id, campaign.cases);
+        let run = embedded::run_embedded(&library, task, CancellationToken::new(), stop);
+        let error = run.await.unwrap_err();
+        assert!(matches!(error, FarmError::NotRunning { .. }), "{error}");
+        let told = format!("was {state} meanwhile");
+        let told = [told.as_str(), "the same command continues it"];
+        assert!(told.iter().all(|part| error.to_string().contains(part)), "{error}");
+    }
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
