@@ -267,13 +267,17 @@ fn print(reproduction: &Reproduction, out: &Path) {
         ));
     }
     let count = |verdict| reproduction.count(verdict);
+    let checks = match reproduction.checks() {
+        0 => String::new(),
+        checks => {
+            format!("of {checks} checks of the program {} hold; ", count(ClaimVerdict::Holds))
+        }
+    };
     println_stdout(&format!(
-        "{} reproduced, {} differ, {} cannot tell; of {} checks of the program {} hold; page: {}",
+        "{} reproduced, {} differ, {} cannot tell; {checks}page: {}",
         count(ClaimVerdict::Reproduced),
         count(ClaimVerdict::Differs),
         count(ClaimVerdict::CannotTell),
-        reproduction.checks(),
-        count(ClaimVerdict::Holds),
         out.join(PAGE).display()
     ));
 }

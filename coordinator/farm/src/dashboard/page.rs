@@ -196,25 +196,12 @@ fn spectra(campaign: &FarmCampaign) -> String {
     chart.into_svg()
 }
 
-/// Least and greatest value among the cases of a campaign, which has at least one.
-fn extent(campaign: &FarmCampaign, parameter: Parameter) -> [f64; 2] {
-    let cases = campaign.covered.iter().chain(&campaign.given_up);
-    let [low, high] = cases
-        .map(|set| set[parameter])
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
-            [low.min(value), high.max(value)]
-        });
-    // A single case stands in the middle.
-    let margin = 0.03 * (high - low).max(0.1 * high.abs());
-    [low - margin, high + margin]
-}
-
 fn scatter(campaign: &FarmCampaign, [x, y]: [Parameter; 2]) -> String {
     let axis = |parameter: Parameter| {
         let shown = Shown::of(parameter);
-        let [low, high] = extent(campaign, parameter);
         let label = format!("{} in {}", parameter.label(), shown.unit);
-        Axis::linear(&label, low / shown.divisor, high / shown.divisor)
+        let cases = campaign.covered.iter().chain(&campaign.given_up);
+        Axis::around(&label, cases.map(|set| set[parameter] / shown.divisor))
     };
     let [x_divisor, y_divisor] = [x, y].map(|parameter| Shown::of(parameter).divisor);
     let points = |sets: &[ParameterSet]| -> Vec<(f64, f64)> {
@@ -273,17 +260,20 @@ mod tests {
     }
 
     #[test]
-    fn the_axes_of_the_parameter_space_hold_the_cases_of_any_track() {
+    fn the_parameter_space_shows_the_cases_of_any_track() {
         let mut line = farm().campaigns.remove(0);
         let mut stiffer = ParameterSet::nominal();
-        let stiffness = Parameter::RailpadStiffness;
-        stiffer[stiffness] *= 5.0;
+        stiffer[Parameter::RailpadStiffness] *= 5.0;
+        stiffer[Parameter::BallastStiffness] *= 9.0;
         line.given_up = vec![stiffer];
-        let [low, high] = extent(&line, stiffness);
-        assert!(low < line.covered[0][stiffness] && stiffer[stiffness] < high, "{low} {high}");
-        line.given_up.clear();
-        let [low, high] = extent(&line, stiffness);
-        assert!(low < line.covered[0][stiffness] && line.covered[0][stiffness] < high);
+        let picture = scatter(&line, [Parameter::RailpadStiffness, Parameter::BallastStiffness]);
+        let places = |name: &str, most: f64| {
+            let before = format!(" {name}=\"");
+            let values = picture.split(&before).skip(1);
+            let values = values.map(|it| it.split('"').next().unwrap().parse::<f64>().unwrap());
+            values.filter(|value| (0.0..most).contains(value)).count()
+        };
+        assert_eq!([places("cx", SCATTER[0]), places("cy", SCATTER[1])], [2, 2], "{picture}");
     }
 
     #[test]

@@ -22,10 +22,10 @@ pub enum DispatchError {
         /// Cause.
         source: ExperimentError,
     },
-    /// Another version stored the experiment in a form that this version does not reproduce.
+    /// Another version stored the experiment, and this version writes it in another form.
     #[error(
-        "campaign {campaign}: another version of tracktwin stored its experiment, and this version would simulate it in \
-         another form; continue it with that version, or add the campaign again under another name"
+        "campaign {campaign}: another version of tracktwin stored its experiment, and this version does not reproduce it; \
+         continue the campaign with that version, or add its file again"
     )]
     OtherForm {
         /// Id of the campaign.

@@ -127,8 +127,8 @@ impl Gain {
     fn sentence(&self) -> String {
         let Self { estimate, lower, upper, is_far } = self;
         let numbers = format!(
-            "The measured receptances are {estimate:.3} times the true ones (90 % interval {lower:.3} to \
-             {upper:.3})"
+            "By the fit the measured receptances are {estimate:.3} times the true ones (90 % interval \
+             {lower:.3} to {upper:.3})"
         );
         if *is_far {
             format!(
