@@ -50,7 +50,8 @@ pub fn run(program: &str, arguments: &[&str]) -> Answer {
 }
 
 /// Simulates a recording with two passes at each of these speeds in km/h, on a track of `spans` spans with the
-/// physics of this extension file (none if it is empty). Returns the path of the recording.
+/// physics of this extension file (none if it is empty), and with a little noise, without which a second pass is a
+/// copy. Returns the path of the recording.
 ///
 /// # Panics
 /// Panics if the extension file cannot be written or the simulation fails.
@@ -63,7 +64,8 @@ pub fn simulated(
 ) -> String {
     let [file, out] =
         [recording.with_extension("toml"), recording.into()].map(|path| path.display().to_string());
-    let mut arguments = vec!["simulate", "--passes", "2", "--spans", spans, "--seed", "3"];
+    let mut arguments = vec!["simulate", "--passes", "2", "--noise", "0.01", "--seed", "3"];
+    arguments.extend(["--spans", spans]);
     arguments.extend(speeds.iter().flat_map(|speed| ["--speed", speed]));
     arguments.extend(["--out", &out]);
     if !extension.is_empty() {

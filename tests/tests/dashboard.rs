@@ -220,6 +220,14 @@ fn read(tab: &Tab) -> String {
     text.and_then(|it| it.as_str().map(str::to_owned)).unwrap_or_default()
 }
 
+/// Number of requests of the page whose address contains this path.
+fn loaded(tab: &Tab, path: &str) -> u64 {
+    let count = format!(
+        "performance.getEntriesByType('resource').filter(it => it.name.includes('{path}')).length"
+    );
+    tab.evaluate(&count, false).unwrap().value.unwrap().as_u64().unwrap()
+}
+
 #[test]
 fn a_browser_shows_a_campaign_as_it_goes_and_presses_its_buttons() {
     let Some(browser) = browser() else { return };
@@ -242,8 +250,19 @@ fn a_browser_shows_a_campaign_as_it_goes_and_presses_its_buttons() {
     // Nobody loads the page again.
     farm.work();
     until("the page says so", || read(&tab).contains("24 of 24 cases finished"));
+    until("the summary says so", || read(&tab).contains("Campaigns with work to do: 0 of 1"));
     assert!(tab.find_elements("svg").unwrap().len() >= 3, "spectra and parameter space");
+    // Charts are not loaded again while nothing changes.
+    let [charts, views] = ["/charts/", "/view"].map(|path| loaded(&tab, path));
+    until("the page is updated twice", || loaded(&tab, "/view") >= views + 2);
+    assert_eq!(loaded(&tab, "/charts/"), charts);
+    assert!(tab.find_elements("svg").unwrap().len() >= 3, "charts are kept");
     let outside = "performance.getEntriesByType('resource').filter(\
         it => !it.name.startsWith(location.origin)).length";
     assert_eq!(tab.evaluate(outside, false).unwrap().value.unwrap(), 0);
+
+    assert!(!read(&tab).contains("not up to date"));
+    farm.processes.clear();
+    until("the page says that it is old", || read(&tab).contains("not up to date"));
+    assert!(read(&tab).contains("24 of 24 cases finished"), "what was known is kept");
 }

@@ -1,6 +1,7 @@
 //! The command line of `tracktwin-worker`: arguments, signals, log and exit codes.
 
 use crate::agent::{self, AgentError, Config};
+use crate::slot::Slot;
 use crate::{Credentials, LogFormat, Token, log_to_stderr};
 use anyhow::Context;
 use clap::Parser;
@@ -16,6 +17,7 @@ use tracing_subscriber::EnvFilter;
 use tracing_subscriber::filter::LevelFilter;
 use tracktwin_parameters::QuantityError;
 use tracktwin_parameters::quantity::{CORES, SECONDS};
+use tracktwin_protocol::BadMessage;
 use tracktwin_traces::{Export, ExportError};
 
 /// Exit code for wrong arguments, and for a worker that its coordinator refuses.
@@ -64,6 +66,10 @@ struct Arguments {
     /// Number of cores [default: all].
     #[arg(long, value_name = "N", env = "TRACKTWIN_CORES", value_parser = cores)]
     cores: Option<NonZeroUsize>,
+    /// Name of the worker, unique in the farm and the same after a restart: quarantine and suspension
+    /// belong to it [default: host name and number of the worker on its host].
+    #[arg(long, value_name = "NAME", env = "TRACKTWIN_NAME", value_parser = name)]
+    name: Option<String>,
     /// Exit with code 0 after this time without work [default: never].
     #[arg(long, value_name = "SECONDS", env = "TRACKTWIN_IDLE_EXIT", value_parser = seconds)]
     idle_exit: Option<u64>,
@@ -99,6 +105,10 @@ fn cores(text: &str) -> Result<NonZeroUsize, QuantityError> {
     cores.ok_or(QuantityError::Range { value: 0.0, of: Box::new(CORES) })
 }
 
+fn name(text: &str) -> Result<String, BadMessage> {
+    tracktwin_protocol::name("the name", text.to_owned())
+}
+
 fn seconds(text: &str) -> Result<u64, QuantityError> {
     SECONDS.parse_count(text)
 }
@@ -107,10 +117,14 @@ fn seconds(text: &str) -> Result<u64, QuantityError> {
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     log_to_stderr(arguments.log_format, filter());
-    let config = match config(&arguments) {
+    let mut config = match config(&arguments) {
         Ok(config) => config,
         Err(error) => return report(&error, REFUSED),
     };
+    let slot = if arguments.name.is_none() { Slot::take() } else { None };
+    if let Some(name) = arguments.name.as_ref().or(slot.as_ref().map(|slot| &slot.name)) {
+        config.worker.clone_from(name);
+    }
     match serve(config, arguments.health) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

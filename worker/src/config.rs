@@ -3,6 +3,7 @@
 use crate::counters::Counters;
 use crate::credentials::Credentials;
 use crate::holdings::Holdings;
+use crate::slot::host;
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 use std::time::Duration;
@@ -20,7 +21,8 @@ pub struct Config {
     pub coordinators: Vec<String>,
     /// Number of groups of cases that the worker simulates at a time.
     pub cores: NonZeroUsize,
-    /// The worker's name, unique among workers; see [`unique_name`].
+    /// The worker's name, unique among workers; see [`unique_name`]. Quarantine and suspension belong to the
+    /// name, so a worker of a farm keeps it over a restart.
     pub worker: String,
     /// Credentials of the worker and of its coordinators.
     pub credentials: Credentials,
@@ -83,8 +85,7 @@ impl Config {
 
 /// A unique name of a worker, from host name, process id and a random number.
 pub fn unique_name() -> String {
-    let host = std::fs::read_to_string("/etc/hostname").unwrap_or_default();
-    let host = if host.trim().is_empty() { "worker" } else { host.trim() };
     let chance = (crate::backoff::random_unit() * f64::from(u32::MAX)) as u32;
+    let host = host().unwrap_or_else(|| "worker".to_owned());
     format!("{host}-{}-{chance:08x}", std::process::id())
 }

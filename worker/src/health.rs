@@ -1,6 +1,6 @@
 //! Endpoints of a worker for monitoring: `/healthz` and `/metrics`.
 
-use crate::bounded_listener::BoundedListener;
+use crate::bounded_listener::serve_bounded;
 use crate::counters::Counters;
 use crate::session::Session;
 use axum::Router;
@@ -9,6 +9,7 @@ use axum::routing::get;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::net::TcpListener;
+use tokio_util::sync::CancellationToken;
 
 /// Time without a response of a coordinator after which `/healthz` reports it.
 const SILENCE: Duration = Duration::from_secs(30);
@@ -26,7 +27,7 @@ pub(crate) async fn answer(port: TcpListener, session: Arc<Session>, counters: A
         .route("/healthz", get(healthz))
         .route("/metrics", get(metrics))
         .with_state(Watched { session, counters });
-    if let Err(error) = axum::serve(BoundedListener::new(port), routes).await {
+    if let Err(error) = serve_bounded(port, routes, CancellationToken::new()).await {
         tracing::warn!("the health endpoint has stopped: {error}");
     }
 }

@@ -21,8 +21,9 @@ mod holdings;
 mod logging;
 mod outbox;
 mod session;
+mod slot;
 
-pub use bounded_listener::BoundedListener;
+pub use bounded_listener::serve_bounded;
 pub use counters::Counters;
 pub use credentials::{Credentials, CredentialsError, Token};
 pub use holdings::Holdings;

@@ -272,11 +272,24 @@ impl Session {
                         tracing::debug!(campaign, cases, lost, after_s, "heartbeat acknowledged");
                         self.lose(&campaign, &answer.lost);
                     }
-                    // The worker registers again with the next lease request.
-                    Err(status) if status.code() == Code::Unauthenticated => {}
+                    // The leases are renewed, but the coordinator was restarted, or is another one.
+                    Err(status) if status.code() == Code::Unauthenticated => {
+                        self.register_again(heartbeat).await;
+                    }
                     Err(status) => tracing::info!("heartbeat failed: {}", status.message()),
                 }
             }
+        }
+    }
+
+    /// Registers the worker again, unless it takes longer than `time`: heartbeats must go on.
+    async fn register_again(&self, time: Duration) {
+        let registered = async {
+            let seen = *self.registrations.read().await;
+            self.register(seen, &self.shutdown).await
+        };
+        if let Ok(Err(error)) = tokio::time::timeout(time, registered).await {
+            tracing::warn!("not registered again: {error}");
         }
     }
 

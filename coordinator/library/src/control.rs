@@ -67,6 +67,8 @@ pub enum Retry {
     Flagged,
     /// All cases whose results do not match their checksum. The results are deleted.
     Altered,
+    /// All cases whose results have another model hash than this one. The results are deleted.
+    OtherModel(String),
 }
 
 impl Library {
@@ -126,16 +128,36 @@ impl Library {
     /// Returns [`LibraryError::UnknownCampaign`], or an error if the library cannot be read or written.
     pub async fn retry(&self, campaign: &str, which: Retry) -> Result<u64, LibraryError> {
         self.campaign(campaign).await?;
-        if which == Retry::Altered {
-            return self.retry_altered(campaign).await;
+        match which {
+            Retry::Altered => {
+                self.discard_cases(campaign, |it| it.attested() == Attested::Altered).await
+            }
+            Retry::OtherModel(own) => self.discard_cases(campaign, |it| it.model_hash != own).await,
+            Retry::Flagged => self.write(DiscardFlagged { campaign: campaign.to_owned() }).await,
+            Retry::Failed => self.retry_failed(campaign, None).await,
+            Retry::Cases(indices) => self.retry_failed(campaign, Some(indices)).await,
         }
-        self.write(RetryCases { campaign: campaign.to_owned(), which }).await
     }
 
-    async fn retry_altered(&self, campaign: &str) -> Result<u64, LibraryError> {
+    /// Sets given-up cases to waiting: those of these indices, or all.
+    async fn retry_failed(
+        &self,
+        campaign: &str,
+        indices: Option<Vec<u32>>,
+    ) -> Result<u64, LibraryError> {
+        let indices = indices.map(|it| it.into_iter().map(i64::from).collect());
+        self.write(RetryFailed { campaign: campaign.to_owned(), indices }).await
+    }
+
+    /// Deletes the results of cases that `is_meant` selects, so that they are simulated again.
+    async fn discard_cases(
+        &self,
+        campaign: &str,
+        is_meant: impl Fn(&StoredCase) -> bool,
+    ) -> Result<u64, LibraryError> {
         let mut indices = Vec::new();
         let look = |case: StoredCase| {
-            if case.attested() == Attested::Altered {
+            if is_meant(&case) {
                 indices.push(i64::from(case.case.index));
             }
             Ok(())
@@ -206,28 +228,33 @@ impl Write for SetPriority {
     }
 }
 
-struct RetryCases {
+struct RetryFailed {
     campaign: String,
-    which: Retry,
+    /// The cases; `None` for all.
+    indices: Option<Vec<i64>>,
 }
 
-impl Write for RetryCases {
+impl Write for RetryFailed {
     type Answer = u64;
 
     async fn apply(&self, connection: &mut Connection) -> Result<u64, LibraryError> {
-        match &self.which {
-            Retry::Failed => connection.execute(sql(RETRY_FAILED).bind(&self.campaign)).await,
-            Retry::Cases(indices) => {
-                let indices: Vec<i64> = indices.iter().copied().map(i64::from).collect();
-                connection.execute(sql(RETRY_CASES).bind(&self.campaign).bind(indices)).await
-            }
-            Retry::Flagged | Retry::Altered => self.discard_flagged(connection).await,
-        }
+        let retry = match &self.indices {
+            None => sql(RETRY_FAILED).bind(&self.campaign),
+            Some(indices) => sql(RETRY_CASES).bind(&self.campaign).bind(indices.clone()),
+        };
+        connection.execute(retry).await
     }
 }
 
-impl RetryCases {
-    async fn discard_flagged(&self, connection: &mut Connection) -> Result<u64, LibraryError> {
+/// Deletes flagged results, so that their cases are simulated again.
+struct DiscardFlagged {
+    campaign: String,
+}
+
+impl Write for DiscardFlagged {
+    type Answer = u64;
+
+    async fn apply(&self, connection: &mut Connection) -> Result<u64, LibraryError> {
         let flagged = connection.indices(sql(FLAGGED).bind(&self.campaign)).await?;
         discard(connection, &self.campaign, &flagged).await
     }

@@ -1,9 +1,7 @@
 //! Errors of a library.
 
-use crate::engine::{self, SQLITE_FULL};
-use sqlx::error::DatabaseError;
+use crate::error_code::is_constraint;
 use sqlx::migrate::MigrateError;
-use std::borrow::Cow;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -96,6 +94,20 @@ pub enum LibraryError {
         /// Newest version that this program supports.
         known: i64,
     },
+    /// An earlier version of the program has written the library, which is opened for reading only.
+    #[error(
+        "library {library}: its schema {found} is older than this program's ({known}), and \
+             commands that only read do not change it: upgrade it with `tracktwin library \
+             upgrade`, or use the program that wrote it"
+    )]
+    OlderSchema {
+        /// Name of the library.
+        library: String,
+        /// Version of the library's schema.
+        found: i64,
+        /// Version that this program needs.
+        known: i64,
+    },
     /// Another process has claimed the right to lease the library's cases.
     #[error(
         "library {library}: another process is running a campaign on it; stop it, or wait until \
@@ -122,6 +134,37 @@ pub enum LibraryError {
     OtherDefinition {
         /// Id of the campaign.
         id: String,
+    },
+    /// Another version of the physics has computed the results of the campaign.
+    #[error(
+        "campaign {campaign} was computed with model {stored}, but this program has model \
+             {own}: use the version that computed it, start a new campaign (another `name` in \
+             its file), or let `tracktwin campaign retry {campaign} --other-model` delete those \
+             results and compute them again"
+    )]
+    OtherModel {
+        /// Id of the campaign.
+        campaign: String,
+        /// Hash of the model that computed the results.
+        stored: String,
+        /// Hash of this program's model.
+        own: String,
+    },
+    /// Several versions of the physics have computed the results of the campaign.
+    #[error(
+        "campaign {campaign} has results of two models, {one} and {other} (case {index}): \
+             `tracktwin campaign retry {campaign} --other-model` deletes those of other models \
+             than this program's, and `tracktwin run` or a coordinator computes them again"
+    )]
+    MixedModels {
+        /// Id of the campaign.
+        campaign: String,
+        /// Hash of the model that computed the case with the lowest index.
+        one: String,
+        /// Hash of the other model.
+        other: String,
+        /// Lowest index of a case of the other model.
+        index: u32,
     },
     /// A case of a trial was sealed with another truth.
     #[error(
@@ -294,10 +337,13 @@ impl LibraryError {
                 | Self::NotALibrary { .. }
                 | Self::NotLetIn { .. }
                 | Self::NewerSchema { .. }
+                | Self::OlderSchema { .. }
                 | Self::InUse { .. }
                 | Self::UnknownCampaign { .. }
                 | Self::UnknownWorker { .. }
                 | Self::OtherDefinition { .. }
+                | Self::OtherModel { .. }
+                | Self::MixedModels { .. }
                 | Self::OtherTruth { .. }
                 | Self::SeedTooLarge { .. }
                 | Self::OnlyReads
@@ -337,7 +383,7 @@ impl LibraryError {
     pub(crate) fn is_about_rows(&self) -> bool {
         match self {
             Self::BadRow { .. } | Self::OtherDefinition { .. } => true,
-            Self::Database(error) => code(error).is_some_and(|code| is_constraint(&code)),
+            Self::Database(error) => is_constraint(error),
             _ => false,
         }
     }
@@ -349,78 +395,5 @@ impl LibraryError {
 
     pub(crate) const fn is_unavailable(&self) -> bool {
         matches!(self, Self::Unavailable { .. })
-    }
-}
-
-/// Class of PostgreSQL's codes for a broken connection. The single codes are for a server that stops, was
-/// stopped, is starting, or has no free connection, and for transactions that should be repeated.
-const POSTGRES_BROKEN: &str = "08";
-const POSTGRES_LATER: [&str; 6] = ["57P01", "57P02", "57P03", "53300", "40001", "40P01"];
-
-/// Codes for a read-only file or folder, a read-only transaction, and a role without the right to write.
-const NOT_WRITABLE: [&str; 5] = ["8", "776", "1544", "25006", "42501"];
-
-/// Codes for damage: a malformed file (`SQLite`); a malformed page or index, or a missing file
-/// (PostgreSQL).
-const MALFORMED: [&str; 8] = ["11", "26", "267", "523", "779", "XX001", "XX002", "58P01"];
-
-/// Code of PostgreSQL for a full disk.
-const POSTGRES_FULL: &str = "53100";
-
-/// Whether a code is for a violated constraint: all such codes of `SQLite`, and PostgreSQL's classes for
-/// constraints and for data.
-fn is_constraint(code: &str) -> bool {
-    if code.len() == 5 {
-        return code.starts_with("23") || code.starts_with("22");
-    }
-    code.parse::<u32>().is_ok_and(|code| code % 256 == 19)
-}
-
-fn code(error: &sqlx::Error) -> Option<String> {
-    error.as_database_error().and_then(DatabaseError::code).map(Cow::into_owned)
-}
-
-impl From<MigrateError> for LibraryError {
-    fn from(error: MigrateError) -> Self {
-        match error {
-            MigrateError::Execute(error) => match Self::from(error) {
-                Self::Database(error) => Self::Migration(MigrateError::Execute(error)),
-                known => known,
-            },
-            other => Self::Migration(other),
-        }
-    }
-}
-
-impl From<sqlx::Error> for LibraryError {
-    fn from(error: sqlx::Error) -> Self {
-        use sqlx::Error::{Io, PoolTimedOut, Protocol, Tls, WorkerCrashed};
-        if matches!(error, Io(_) | PoolTimedOut | Protocol(_) | Tls(_) | WorkerCrashed) {
-            return Self::Unavailable { reason: error.to_string() };
-        }
-        if matches!(error, sqlx::Error::PoolClosed) {
-            return Self::Closed;
-        }
-        if let Some(fault) = engine::sqlite_fault(&error) {
-            return fault;
-        }
-        match code(&error).as_deref() {
-            Some(code) if SQLITE_FULL.contains(&code) || code == POSTGRES_FULL => Self::DiskFull,
-            Some(code)
-                if POSTGRES_LATER.contains(&code)
-                    || (code.len() == 5 && code.starts_with(POSTGRES_BROKEN)) =>
-            {
-                Self::Unavailable { reason: error.to_string() }
-            }
-            Some(code) if MALFORMED.contains(&code) => {
-                let reason = error.as_database_error().map(DatabaseError::message);
-                Self::Malformed { reason: reason.unwrap_or_default().to_owned() }
-            }
-            Some(code) if NOT_WRITABLE.contains(&code) => {
-                let reason = error.as_database_error().map(DatabaseError::message);
-                Self::NotWritable { reason: reason.unwrap_or_default().to_owned() }
-            }
-            _ => Self::Database(error),
-        }
     }
 }

@@ -34,6 +34,7 @@
 mod array;
 mod attempt;
 mod audit;
+mod audit_lease;
 mod bins;
 mod campaign;
 mod case;
@@ -42,8 +43,10 @@ mod data;
 mod digest;
 mod engine;
 mod error;
+mod error_code;
 mod lease;
 mod library;
+mod model;
 mod overview;
 mod provenance;
 mod quarantine;

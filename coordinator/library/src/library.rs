@@ -1,7 +1,9 @@
 //! Opening and closing of a library.
 
 use crate::LibraryError;
-use crate::engine::{self, Connection, FileLock, Opened, Readers, Target, Write, iso_utc, sql};
+use crate::engine::{
+    self, Access, Connection, FileLock, Opened, Readers, Target, Write, iso_utc, sql,
+};
 use crate::lease::QueueCursor;
 use std::path::Path;
 use std::sync::Arc;
@@ -34,12 +36,22 @@ impl Library {
     /// Returns [`LibraryError`] if the URL is invalid, if nothing or something other than a library exists
     /// there, or if a later version of the program has written it.
     pub async fn open(url: &str) -> Result<Self, LibraryError> {
-        let library = Self::of(engine::open(url).await?);
+        let library = Self::of(engine::open(url, Access::Write).await?);
         match library.add_missing_bins().await {
             // A damaged library is opened as well, for verification and salvage.
             Err(error) if !error.is_of_the_database() => Err(error),
             _ => Ok(library),
         }
+    }
+
+    /// Opens the library at `sqlite:PATH` or `postgres://...` for reading. Nothing is written, and every write
+    /// returns [`LibraryError::NotWritable`]. With `SQLite`, other programs may read and write meanwhile; the
+    /// files of its write-ahead log (`-wal`, `-shm`) are created if they are missing.
+    ///
+    /// # Errors
+    /// As [`Library::open`], and [`LibraryError::OlderSchema`] if the schema must be updated first.
+    pub async fn open_to_read(url: &str) -> Result<Self, LibraryError> {
+        Ok(Self::of(engine::open(url, Access::Read).await?))
     }
 
     /// Opens the library at `sqlite:PATH` or `postgres://...`, or creates an empty one.

@@ -29,7 +29,7 @@ pub struct CampaignOverview {
     /// Number of cases by state.
     pub status: Status,
     /// Cases finished per second. The average is over the last minute or slightly more, but not before the
-    /// first results of the campaign or the first results after a pause.
+    /// computation of the campaign's first results or of the first results after a pause.
     pub per_second: f64,
     /// Mean computing time of these cases, in s; `None` without results.
     pub mean_case_s: Option<f64>,

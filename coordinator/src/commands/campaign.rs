@@ -10,6 +10,7 @@ use anyhow::{Context, anyhow};
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
 use std::path::PathBuf;
+use tracktwin_experiment::MODEL_HASH;
 use tracktwin_farm::campaign::Campaign;
 use tracktwin_library::{CampaignState, Library, Retry, State};
 use tracktwin_parameters::quantity::CASES;
@@ -55,6 +56,10 @@ pub(super) enum Action {
         /// deleted.
         #[arg(long, conflicts_with_all = ["cases", "flagged"])]
         altered: bool,
+        /// Retry instead the cases whose results another version of the physics computed; their
+        /// results are deleted.
+        #[arg(long, conflicts_with_all = ["cases", "flagged", "altered"])]
+        other_model: bool,
         /// Print JSON.
         #[arg(long)]
         json: bool,
@@ -106,13 +111,14 @@ pub(super) async fn run(action: Action) -> Result<(), Stop> {
             library.cancel(&id).await?;
             done(library, &format!("{id} is cancelled; its results are kept")).await
         }
-        Action::Retry { named, cases, flagged, altered, json } => {
+        Action::Retry { named, cases, flagged, altered, other_model, json } => {
             let (library, id) = named.open().await?;
-            let which = match (flagged, altered, cases.is_empty()) {
+            let which = match (flagged, altered, other_model) {
                 (true, ..) => Retry::Flagged,
                 (_, true, _) => Retry::Altered,
-                (.., true) => Retry::Failed,
-                (.., false) => Retry::Cases(cases),
+                (.., true) => Retry::OtherModel(MODEL_HASH.to_owned()),
+                _ if cases.is_empty() => Retry::Failed,
+                _ => Retry::Cases(cases),
             };
             if let Retry::Cases(indices) = &which {
                 refuse_others(&library, &id, indices).await?;

@@ -1,13 +1,14 @@
-//! Checks whether a campaign continues one in the library or is a new one.
+//! Checks whether a campaign continues one in the library or is a new one, and whether this program may continue it.
 
 use super::Stop;
 use crate::pipeline::lack::check_for_training;
 use anyhow::anyhow;
+use tracktwin_experiment::MODEL_HASH;
 use tracktwin_farm::campaign::{Campaign, Kinship};
 use tracktwin_library::Library;
 
-/// Returns an error if a campaign would be a new one only because its number of cases changed its
-/// sampling sequence; passes other campaigns of the same name, with their differences, to `tell`.
+/// Returns an error if another version of the physics has computed results of the campaign, or if it
+/// would be a new one only because its number of cases changed its sampling sequence; passes other campaigns of the same name, with their differences, to `tell`.
 pub(super) async fn check(
     library: &Library,
     campaign: &Campaign,
@@ -16,7 +17,7 @@ pub(super) async fn check(
     let all = library.campaigns().await?;
     let id = campaign.id();
     if all.iter().any(|it| it.id == id) {
-        return Ok(());
+        return Ok(library.check_model(&id, MODEL_HASH).await?);
     }
     for other in all.iter().filter(|it| it.name == campaign.name) {
         match campaign.kinship(&other.id, &other.definition_json) {

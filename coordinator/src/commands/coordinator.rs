@@ -49,7 +49,8 @@ pub(super) struct Arguments {
     /// --token-file (or --tls-client-ca) are required, or --insecure.
     #[arg(long, value_name = "ADDR", value_parser = address, env = "TRACKTWIN_LISTEN", default_value = "127.0.0.1:7700")]
     listen: SocketAddr,
-    /// Address of the web dashboard, as IP:PORT; it serves /, /metrics (Prometheus) and /healthz.
+    /// Address of the web dashboard, as IP:PORT; it serves /, /metrics (Prometheus) and /healthz
+    /// as plain HTTP. If other machines reach it, --insecure-dashboard is required.
     #[arg(long, value_name = "ADDR", value_parser = address, env = "TRACKTWIN_DASHBOARD")]
     dashboard: Option<SocketAddr>,
     /// Exit when every running campaign is done; given-up cases count as done.
@@ -73,9 +74,14 @@ pub(super) struct Arguments {
     /// Require worker certificates signed by this authority (mutual TLS).
     #[arg(long, value_name = "FILE", env = "TRACKTWIN_TLS_CLIENT_CA", requires = "tls_cert")]
     tls_client_ca: Option<PathBuf>,
-    /// Allow plain text and missing tokens on a network address; only for a trusted network.
+    /// Allow plain text and missing tokens at --listen on a network address; only for a trusted
+    /// network.
     #[arg(long, env = "TRACKTWIN_INSECURE")]
     insecure: bool,
+    /// Allow --dashboard on a network address. Everybody there can read the pages and, without
+    /// --token-file and --tls-client-ca, use their actions; only for a trusted network.
+    #[arg(long, env = "TRACKTWIN_INSECURE_DASHBOARD")]
+    insecure_dashboard: bool,
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
@@ -83,11 +89,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     // Check the arguments before anything is opened.
     security.check(arguments.listen).context("--listen").or_input()?;
     security.acceptor().or_input()?;
-    if let Some(address) = arguments.dashboard {
-        let pages = Security { identity_pem: None, ..security.clone() };
-        // Pages are plain HTTP: access from other machines needs a proxy.
-        pages.check(address).context("--dashboard").or_input()?;
-    }
+    check_dashboard(arguments.dashboard, arguments.insecure_dashboard).or_input()?;
     let _traces = Export::from_environment("tracktwin-coordinator").or_input()?;
     let campaigns = arguments.campaigns.iter().map(|path| Campaign::read(path, arguments.cases));
     let campaigns = campaigns.collect::<Result<Vec<_>, _>>().or_input()?;
@@ -160,6 +162,17 @@ fn token(path: &Path) -> anyhow::Result<String> {
     Ok(text)
 }
 
+/// Returns an error if other machines can reach the dashboard and this is not allowed.
+fn check_dashboard(address: Option<SocketAddr>, insecure: bool) -> anyhow::Result<()> {
+    let Some(address) = address.filter(|it| !it.ip().is_loopback()) else { return Ok(()) };
+    anyhow::ensure!(
+        insecure,
+        "--dashboard: {address} is reachable from other machines, and the pages are plain HTTP; use 127.0.0.1 with \
+         a proxy or `ssh -L`, or --insecure-dashboard on a trusted network"
+    );
+    Ok(())
+}
+
 async fn bind(argument: &str, address: SocketAddr) -> anyhow::Result<TcpListener> {
     let bound = TcpListener::bind(address).await;
     bound.with_context(|| format!("{argument}: cannot bind {address}"))
@@ -203,6 +216,16 @@ mod tests {
         for wrong in ["", "-1%", "200%", "1", "NaN", "some"] {
             assert!(share(wrong).is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn pages_that_other_machines_reach_need_an_argument_of_their_own() {
+        let address = |text: &str| Some(text.parse().unwrap());
+        assert!(check_dashboard(None, false).is_ok());
+        assert!(check_dashboard(address("127.0.0.1:7780"), false).is_ok());
+        assert!(check_dashboard(address("0.0.0.0:7780"), true).is_ok());
+        let error = check_dashboard(address("0.0.0.0:7780"), false).unwrap_err().to_string();
+        assert!(error.contains("--insecure-dashboard"), "{error}");
     }
 
     #[test]

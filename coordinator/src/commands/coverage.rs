@@ -98,7 +98,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     }
     let (models, library) = models_and_library(&arguments)?;
     let models = Trained::load(models).or_input()?;
-    let library = Library::open(library).await?;
+    let library = Library::open_to_read(library).await?;
     let evaluator = Evaluator::new(models, &library).await.map_err(stop)?;
     library.close().await;
     let Arguments { tracks, sleepers, seed, json, .. } = arguments;

@@ -21,6 +21,11 @@ pub(super) struct LibraryUrl {
 }
 
 impl LibraryUrl {
+    /// Opens the library, which must exist, for reading. Use this for commands that write nothing.
+    pub(super) async fn open_to_read(&self) -> Result<Library, Stop> {
+        Ok(Library::open_to_read(&self.url).await?)
+    }
+
     /// Opens the library, which must exist.
     pub(super) async fn open(&self) -> Result<Library, Stop> {
         Ok(Library::open(&self.url).await?)

@@ -1,7 +1,7 @@
 //! `tracktwin status`: progress of a farm, once or continuously.
 
 use super::library_url::LibraryUrl;
-use super::{Stop, write_stdout};
+use super::{Stop, println_stderr, write_stdout};
 use crate::commands::contact::contact_sentence;
 use clap::Args;
 use serde_json::{Value, json};
@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use std::io::IsTerminal;
 use std::time::Duration;
 use tracktwin_farm::dashboard::{Detail, Farm, FarmCampaign, FarmWorker, duration, farm};
-use tracktwin_library::ContactLoss;
+use tracktwin_library::{ContactLoss, Library};
 
 /// Characters of a progress bar.
 const BAR: usize = 30;
@@ -28,7 +28,7 @@ const CLEAR: &str = "\x1b[2J\x1b[H";
 pub(super) struct Arguments {
     #[command(flatten)]
     library: LibraryUrl,
-    /// Repeat until Ctrl-C.
+    /// Repeat until Ctrl-C, also while the library is away.
     #[arg(long, conflicts_with = "json")]
     watch: bool,
     /// Interval of `--watch`.
@@ -41,24 +41,33 @@ pub(super) struct Arguments {
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
-    let library = arguments.library.open().await?;
-    let terminal = std::io::stdout().is_terminal();
-    loop {
-        let farm = farm(&library, Detail::Counts).await?;
-        let text = if arguments.json {
-            format!("{:#}\n", as_json(&farm))
-        } else if arguments.watch && terminal {
-            format!("{CLEAR}{}\n", text(&farm))
-        } else {
-            format!("{}\n", text(&farm))
-        };
-        let is_read = write_stdout(text.as_bytes());
-        if !(arguments.watch && is_read) {
-            library.close().await;
-            return Ok(());
-        }
-        tokio::time::sleep(Duration::from_secs(arguments.every)).await;
+    let library = arguments.library.open_to_read().await?;
+    let pause = Duration::from_secs(arguments.every);
+    while show(&library, &arguments).await? && arguments.watch {
+        tokio::time::sleep(pause).await;
     }
+    library.close().await;
+    Ok(())
+}
+
+/// Prints the present state. Returns whether somebody reads it. With `--watch`, a temporary error of the library is
+/// printed instead, because the next state may be readable.
+async fn show(library: &Library, arguments: &Arguments) -> Result<bool, Stop> {
+    let farm = match farm(library, Detail::Counts).await {
+        Err(error) if arguments.watch && error.is_temporary() => {
+            println_stderr(&format!("{error}; trying again"));
+            return Ok(true);
+        }
+        read => read?,
+    };
+    let text = if arguments.json {
+        format!("{:#}\n", as_json(&farm))
+    } else if arguments.watch && std::io::stdout().is_terminal() {
+        format!("{CLEAR}{}\n", text(&farm))
+    } else {
+        format!("{}\n", text(&farm))
+    };
+    Ok(write_stdout(text.as_bytes()))
 }
 
 fn text(farm: &Farm) -> String {

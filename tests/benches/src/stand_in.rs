@@ -1,5 +1,6 @@
 //! Workers that compute nothing. They lease from a library, and report features of 12 kB per case.
 
+use std::collections::HashMap;
 use tempfile::TempDir;
 use tokio::task::JoinSet;
 use tracktwin_experiment::{Outcome, PassFeatures};
@@ -124,6 +125,7 @@ pub async fn lease(
         indices_below: u32::MAX,
         worker: worker.to_owned(),
         cases_max,
+        cases_max_of: HashMap::new(),
         held: Vec::new(),
         now_unix_ms: library.now_unix_ms(),
         lease_ms: 12_000,

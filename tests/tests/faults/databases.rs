@@ -1,9 +1,10 @@
 //! Databases stop, and disks are full.
 
-use crate::farm::Farm;
+use crate::farm::{Farm, PATIENCE, PROGRAM};
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
+use system_tests::until;
 use test_needs::skipped;
 use test_postgres::{Server, Settings};
 
@@ -37,6 +38,33 @@ fn a_run_rides_out_a_server_that_is_away_for_twenty_seconds() {
     server.start_again();
     Farm::finish(&mut run);
     farm.assert_undisturbed();
+}
+
+#[test]
+fn a_status_that_is_watched_rides_out_a_server_that_is_away() {
+    let Some(server) = Server::start(Settings::default()) else { return };
+    let farm = Farm::on(tempfile::tempdir().unwrap(), server.database(), 8);
+    let folder = tempfile::tempdir().unwrap();
+    let [out, err] = ["out", "err"].map(|name| folder.path().join(name));
+    let mut watch = Command::new(PROGRAM);
+    watch.args(["status", "--watch", "--every", "1", "--library", &farm.library]);
+    watch.stdout(std::fs::File::create(&out).unwrap());
+    watch.stderr(std::fs::File::create(&err).unwrap());
+    let mut watch = watch.spawn().unwrap();
+    let count =
+        |file: &Path, words: &str| std::fs::read_to_string(file).unwrap().matches(words).count();
+    let states = || count(&out, "8 cases: 0 finished");
+    until("it shows the state", PATIENCE, || states() > 0);
+    server.stop();
+    let told = || count(&err, "trying again") > 0 || watch.try_wait().unwrap().is_some();
+    until("it tells that the server is away", PATIENCE, told);
+    let before = states();
+    server.start_again();
+    let shown = || states() > before || watch.try_wait().unwrap().is_some();
+    until("it shows the state again", PATIENCE, shown);
+    assert!(watch.try_wait().unwrap().is_none(), "{}", std::fs::read_to_string(&err).unwrap());
+    watch.kill().unwrap();
+    watch.wait().unwrap();
 }
 
 /// A separate small file system.

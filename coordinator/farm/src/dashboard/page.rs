@@ -19,28 +19,40 @@ const PLANES: [[Parameter; 2]; 2] = [
 const STYLE: &str = "
 .progress{display:flex;height:1rem;background:var(--faint);max-width:60rem;margin:.4rem 0}.progress i{display:block}
 .progress .finished{background:var(--c)}.progress .leased{background:var(--f)}.progress .failed{background:var(--b)}
+body.stale header,body.stale main{opacity:.4}#stale{position:sticky;bottom:0;margin:0;padding:.6rem 0;background:var(--paper)}
 form{display:inline}button,input{font:inherit;font-size:.88rem;padding:.15rem .6rem}.state{font-weight:600}.bad{color:var(--b);font-weight:600}
 ";
 
-/// Updates the main part of the page every two seconds; without the script the page is static.
+/// Updates summary and main part of the page every two seconds, and dims them if that fails. Charts are kept until the
+/// version of their campaign changes. Without the script the page is static.
 const SCRIPT: &str = "
-setInterval(async()=>{try{const answer=await fetch('view');if(answer.ok)document.querySelector('main').innerHTML=await answer.text();
-document.querySelector('footer').style.opacity=1}catch{document.querySelector('footer').style.opacity=.3}},2000)
+const load=async path=>{const answer=await fetch(path,{signal:AbortSignal.timeout(20000)});if(!answer.ok)throw answer;return answer.text()},
+shown=next=>[...document.querySelectorAll('.charts')].find(it=>it.dataset.version===next.dataset.version),
+update=async()=>{const page=new DOMParser().parseFromString(await load('view'),'text/html'),charts=[...page.querySelectorAll('.charts')];
+for(const next of charts.filter(it=>!shown(it)))next.innerHTML=await load('charts/'+encodeURIComponent(next.dataset.campaign));
+for(const next of charts){const kept=shown(next);if(kept)next.replaceWith(kept)}
+for(const part of ['.summary','main'])document.querySelector(part).replaceWith(page.querySelector(part))},
+mark=stale=>{document.body.classList.toggle('stale',stale);document.querySelector('#stale').hidden=!stale},
+turn=()=>update().then(()=>mark(false),()=>mark(true)).then(()=>setTimeout(turn,2000));
+setTimeout(turn,2000)
 ";
 
-/// The whole page.
+/// The whole page; without charts if those of the campaigns were not read.
 pub(super) fn farm_page(farm: &Farm) -> String {
     let head = html! { style { (PreEscaped(STYLE)) } };
     // Outside of what changes, or typing would be lost.
     let end = html! {
         @if !farm.may_control { (login()) }
+        p #stale.bad role="status" hidden {
+            "This page is not up to date: the coordinator or its library does not respond."
+        }
         script { (PreEscaped(SCRIPT)) }
     };
     page_with("The farm", &summary(farm), &head, &farm_view(farm), &end)
 }
 
-/// The main part of the page, which is updated.
-pub(super) fn farm_view(farm: &Farm) -> Markup {
+/// The main part of the page.
+fn farm_view(farm: &Farm) -> Markup {
     html! {
         p.note { "library " code { (farm.library) } ", " (farm.at) }
         @if farm.campaigns.is_empty() {
@@ -73,11 +85,12 @@ const CAPTION: &str = "Local wavelet power spectra of the newest cases, by case 
      speed; finished cases in the parameter space; given-up cases in orange.";
 
 fn campaign_part(campaign: &FarmCampaign, may_control: bool) -> Markup {
-    let FarmCampaign { waiting, leased, finished, failed, .. } = campaign;
-    let pictures = pictures(campaign);
+    let FarmCampaign { id, waiting, leased, finished, failed, .. } = campaign;
+    // What is drawn changes with these numbers only.
+    let version = format!("{id} {finished} {failed}");
     html! {
         section {
-            h2 { (campaign.id) " " span.state { (campaign.state_text()) } }
+            h2 { (id) " " span.state { (campaign.state_text()) } }
             (progress(campaign))
             p {
                 (finished) " of " (campaign.cases()) " cases finished, " (leased) " in work, "
@@ -89,9 +102,15 @@ fn campaign_part(campaign: &FarmCampaign, may_control: bool) -> Markup {
             }
             @if may_control { (buttons(campaign)) }
             @if !campaign.causes.is_empty() { (causes(&campaign.causes)) }
-            @if !pictures.is_empty() { (figure(&pictures, CAPTION)) }
+            div.charts data-campaign=(id) data-version=(version) { (charts(campaign)) }
         }
     }
+}
+
+/// The charts of a campaign; empty without cases to draw.
+pub(super) fn charts(campaign: &FarmCampaign) -> Markup {
+    let pictures = pictures(campaign);
+    html! { @if !pictures.is_empty() { (figure(&pictures, CAPTION)) } }
 }
 
 fn progress(campaign: &FarmCampaign) -> Markup {

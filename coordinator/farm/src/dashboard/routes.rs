@@ -1,8 +1,9 @@
 //! HTTP routes of the dashboard, and the rights that each of them requires.
 
 use super::metrics;
-use super::page::{farm_page, farm_view};
-use super::view::{Detail, farm};
+use super::page::{charts, farm_page};
+use super::status::Farm;
+use super::view::{Detail, drawn, farm};
 use crate::dispatch::Counts;
 use crate::security::{Guard, Security};
 use axum::extract::{Form, Path, Request, State};
@@ -17,7 +18,7 @@ use std::sync::Arc;
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 use tracktwin_library::{Library, LibraryError, Retry};
-use tracktwin_worker::BoundedListener;
+use tracktwin_worker::serve_bounded;
 
 /// Name of the cookie of a user who has given the token.
 const COOKIE: &str = "tracktwin";
@@ -75,15 +76,14 @@ pub async fn serve(listener: TcpListener, dashboard: Dashboard, stop: Cancellati
     let routes = Router::new()
         .route("/", get(page))
         .route("/view", get(view))
+        .route("/charts/{campaign}", get(campaign_charts))
         .route("/login", post(login))
         .route("/campaign/{action}", post(control))
         .route("/metrics", get(numbers))
         .route("/healthz", get(healthz))
         .layer(middleware::from_fn_with_state(dashboard.clone(), same_origin))
         .with_state(dashboard);
-    let served = axum::serve(BoundedListener::new(listener), routes)
-        .with_graceful_shutdown(stop.cancelled_owned());
-    if let Err(error) = served.await {
+    if let Err(error) = serve_bounded(listener, routes, stop).await {
         tracing::error!("the dashboard has stopped: {error}");
     }
 }
@@ -129,18 +129,32 @@ async fn page(
     State(dashboard): State<Dashboard>,
     Extension(MayControl(may_control)): Extension<MayControl>,
 ) -> Result<Html<String>, Failed> {
-    let mut farm = farm(&dashboard.0.library, Detail::Pictures).await?;
-    farm.may_control = may_control;
-    Ok(Html(farm_page(&farm)))
+    whole_page(&dashboard, Detail::Pictures, may_control).await
 }
 
+/// The page without charts, for updates.
 async fn view(
     State(dashboard): State<Dashboard>,
     Extension(MayControl(may_control)): Extension<MayControl>,
 ) -> Result<Html<String>, Failed> {
-    let mut farm = farm(&dashboard.0.library, Detail::Pictures).await?;
-    farm.may_control = may_control;
-    Ok(Html(farm_view(&farm).into_string()))
+    whole_page(&dashboard, Detail::Counts, may_control).await
+}
+
+async fn whole_page(
+    dashboard: &Dashboard,
+    detail: Detail,
+    may_control: bool,
+) -> Result<Html<String>, Failed> {
+    let farm = farm(&dashboard.0.library, detail).await?;
+    Ok(Html(farm_page(&Farm { may_control, ..farm })))
+}
+
+async fn campaign_charts(
+    State(dashboard): State<Dashboard>,
+    Path(campaign): Path<String>,
+) -> Result<Html<String>, Failed> {
+    let campaign = drawn(&dashboard.0.library, campaign).await?;
+    Ok(Html(charts(&campaign).into_string()))
 }
 
 #[derive(Deserialize)]
@@ -186,8 +200,13 @@ async fn control(
 }
 
 async fn numbers(State(dashboard): State<Dashboard>) -> Result<String, Failed> {
-    let farm = farm(&dashboard.0.library, Detail::Counts).await?;
-    Ok(metrics::text(&farm, &dashboard.0.counts))
+    let library = &dashboard.0.library;
+    let farm = farm(library, Detail::Counts).await?;
+    let mut audits = Vec::with_capacity(farm.campaigns.len());
+    for campaign in &farm.campaigns {
+        audits.push(library.audits(&campaign.id).await?);
+    }
+    Ok(metrics::text(&farm, &audits, &dashboard.0.counts))
 }
 
 /// Health check: succeeds if the library responds.

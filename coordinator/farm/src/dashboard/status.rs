@@ -69,6 +69,8 @@ pub struct FarmWorker {
     pub case_s: Option<f64>,
     /// Time since the last message, in s.
     pub silent_s: f64,
+    /// Whether the worker is in quarantine.
+    pub quarantined: bool,
     /// Reason of the quarantine, or the number of failures in a row, as text; `None` if neither applies.
     pub aside: Option<String>,
 }

@@ -3,7 +3,9 @@
 use super::status::{Farm, FarmCampaign, FarmWorker};
 use time::OffsetDateTime;
 use tracktwin_experiment::Experiment;
-use tracktwin_library::{CampaignOverview, ContactLoss, Library, LibraryError, WorkerRecord};
+use tracktwin_library::{
+    CampaignOverview, ContactLoss, Library, LibraryError, WorkerRecord, WorkerState,
+};
 
 /// Newest cases whose spectra are shown.
 const NEWEST: u32 = 5;
@@ -70,6 +72,14 @@ fn with_counts(overview: &CampaignOverview, lost: ContactLoss) -> FarmCampaign {
     }
 }
 
+/// Reads what the charts of a campaign show; the counts are left out.
+///
+/// # Errors
+/// Returns [`LibraryError`] if the library cannot be read or has no such campaign.
+pub(super) async fn drawn(library: &Library, id: String) -> Result<FarmCampaign, LibraryError> {
+    with_charts(library, FarmCampaign { id, ..FarmCampaign::default() }).await
+}
+
 async fn with_charts(
     library: &Library,
     campaign: FarmCampaign,
@@ -96,6 +106,7 @@ fn worker(record: WorkerRecord, now_unix_ms: i64) -> FarmWorker {
     let in_a_row = record.failures_in_a_row;
     let failing = (in_a_row > 1).then(|| format!("{in_a_row} failures in a row"));
     FarmWorker {
+        quarantined: record.state == WorkerState::Quarantined,
         aside: record.reason.map(|reason| format!("quarantine: {reason}")).or(failing),
         id: record.id,
         code_version: record.code_version,

@@ -1,13 +1,14 @@
 //! Audits: a second worker simulates a share of the finished cases again, and the results are compared.
 //!
 //! The worker cannot distinguish an audit from an ordinary case. If two results differ, the coordinator
-//! simulates the case itself and determines which worker is wrong.
+//! simulates the case itself and determines which worker is wrong. A simulation that failed proves nothing:
+//! another worker repeats it, and after too many failures the coordinator.
 
+use super::FAILURES_MAX;
 use super::campaigns::{Campaigns, Served};
 use super::settings::Settings;
 use parking_lot::Mutex;
 use std::collections::HashMap;
-use std::collections::hash_map::Entry;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::time::Instant;
@@ -46,29 +47,29 @@ const DB_PER_LN: f64 = 10.0 * std::f64::consts::LOG10_E;
 /// Number of cases of an audit lease: one group.
 const CASES: u32 = tracktwin_worker::agent::GROUP as u32;
 
-/// Duration of an audit lease. Audit leases are not renewed.
-const LEASE: Duration = Duration::from_mins(10);
-
 /// Minimum pause before the next search, after a search found no case to audit.
 const PAUSE: Duration = Duration::from_secs(2);
 
-/// The audits that are leased at present.
+/// Leases audits and compares their results.
 pub(crate) struct Audits {
     library: Library,
     share: f64,
     prepare: Prepare,
-    under_way: Mutex<HashMap<(String, u32), (String, Audit)>>,
+    lease_ms: i64,
+    /// Number of failed simulations of open audits, by campaign and index.
+    failures: Mutex<HashMap<(String, u32), u32>>,
     next: Mutex<Option<Instant>>,
 }
 
 impl Audits {
     pub(crate) fn new(library: Library, settings: &Settings) -> Self {
-        let Settings { audit_share, prepare, .. } = settings;
+        let Settings { audit_share, prepare, timing, .. } = settings;
         Self {
             library,
             share: *audit_share,
             prepare: *prepare,
-            under_way: Mutex::default(),
+            lease_ms: i64::try_from(timing.lease.as_millis()).unwrap_or(i64::MAX),
+            failures: Mutex::default(),
             next: Mutex::default(),
         }
     }
@@ -87,48 +88,34 @@ impl Audits {
         for campaign in self.library.campaigns().await? {
             // One that this version can't do must not hold up the others.
             let Ok(served) = campaigns.of(&campaign.id).await else { continue };
-            let lease_ms = i64::try_from(LEASE.as_millis()).unwrap_or(i64::MAX);
             let sample =
-                self.library.audit_sample(&campaign.id, worker, cases_max, lease_ms).await?;
+                self.library.audit_sample(&campaign.id, worker, cases_max, self.lease_ms).await?;
             if sample.is_empty() {
                 continue;
             }
-            let cases = sample.iter().map(|it| LeasedCase { case: it.case.clone(), epoch: EPOCH });
-            let lease = served.lease(cases.collect());
-            for audit in sample {
-                self.put(worker.to_owned(), audit);
-            }
+            let cases = sample.into_iter().map(|it| LeasedCase { case: it.case, epoch: EPOCH });
             *self.next.lock() = None;
-            return Ok(Some(lease));
+            return Ok(Some(served.lease(cases.collect())));
         }
         Ok(None)
     }
 
-    /// Releases audits that their worker will not do.
-    pub(crate) async fn release(
+    /// Renews the leases of audits.
+    pub(crate) async fn renew(
         &self,
         worker: &str,
         campaign: &str,
         indices: Vec<u32>,
     ) -> Result<(), LibraryError> {
-        for &index in &indices {
-            self.take(worker, campaign, index);
-        }
-        self.library.release_audits(campaign, worker, indices).await
+        self.library.renew_audits(campaign, worker, indices, self.lease_ms).await
     }
 
-    fn put(&self, worker: String, audit: Audit) {
-        let key = (audit.campaign.clone(), audit.case.index);
-        self.under_way.lock().insert(key, (worker, audit));
-    }
-
-    /// Removes and returns an audit if it is leased to this worker. The audit of another worker is kept.
-    fn take(&self, worker: &str, campaign: &str, index: u32) -> Option<Audit> {
-        let mut under_way = self.under_way.lock();
-        match under_way.entry((campaign.to_owned(), index)) {
-            Entry::Occupied(entry) if entry.get().0 == worker => Some(entry.remove().1),
-            _ => None,
-        }
+    /// Counts a failed simulation of an audit; returns whether workers must not try it again.
+    fn has_failed_too_often(&self, audit: &Audit) -> bool {
+        let mut failures = self.failures.lock();
+        let count = failures.entry((audit.campaign.clone(), audit.case.index)).or_insert(0);
+        *count += 1;
+        *count >= FAILURES_MAX
     }
 
     /// Whether a search for audits is due. If it is, the next search is due after [`PAUSE`].
@@ -143,7 +130,7 @@ impl Audits {
     }
 
     /// Compares the result of an auditing worker with the stored result, and returns the outcome; `None` if
-    /// this worker had no such audit.
+    /// this worker has no such audit. If the worker failed, the audit is released.
     ///
     /// The comparison is completed even if the caller is dropped.
     pub(crate) async fn report(
@@ -152,18 +139,19 @@ impl Audits {
         served: &Arc<Served>,
         report: CaseReport,
     ) -> Result<Option<AuditOutcome>, LibraryError> {
-        let Some(audit) = self.take(worker, &served.record.id, report.index) else {
+        let (campaign, index) = (&served.record.id, report.index);
+        let Some(audit) = self.library.leased_audit(campaign, index, worker).await? else {
             return Ok(None);
         };
+        if let Outcome::Failed { reason } = &report.outcome
+            && !self.has_failed_too_often(&audit)
+        {
+            tracing::warn!(worker, "audit of case {index} of {campaign} failed: {reason}");
+            self.library.release_audits(campaign, worker, vec![index]).await?;
+            return Ok(Some(AuditOutcome::Failed));
+        }
         let (this, worker, served) = (self.clone(), worker.to_owned(), served.clone());
-        let compare = async move {
-            let found = this.compare(&worker, served, &audit, &report.outcome).await;
-            if found.is_err() {
-                // The auditor reports again.
-                this.put(worker, audit);
-            }
-            found
-        };
+        let compare = async move { this.compare(&worker, served, &audit, &report.outcome).await };
         tokio::spawn(compare).await.expect("comparing does not panic")
     }
 
@@ -176,24 +164,27 @@ impl Audits {
     ) -> Result<Option<AuditOutcome>, LibraryError> {
         let (campaign, index) = (&audit.campaign, audit.case.index);
         let Some(entry) = self.library.entry(campaign, index).await? else { return Ok(None) };
-        let difference_db = difference(&entry.features, outcome);
-        let agrees = difference_db <= TOLERANCE_DB;
-        let wrong = if agrees {
-            None
-        } else {
-            let judged = self.judge(served, audit.case.clone()).await;
-            judged.map(|judged| {
-                let stored_is_right = difference(&entry.features, &judged) <= TOLERANCE_DB;
-                if stored_is_right { worker } else { audit.worker.as_str() }
-            })
+        let differs = |found: &Outcome| difference(&entry.features, found) > TOLERANCE_DB;
+        let judged =
+            if differs(outcome) { self.judge(served, audit.case.clone()).await } else { None };
+        // Where the worker failed, the coordinator is the second to simulate the case.
+        let (second, found) = match (outcome, &judged) {
+            (Outcome::Failed { .. }, Some(judged)) => ("the coordinator", judged),
+            _ => (worker, outcome),
         };
+        let difference_db = difference(&entry.features, found);
+        let agrees = !differs(found);
+        let stored_is_wrong = judged.as_ref().map(differs);
+        let wrong = stored_is_wrong.filter(|_| !agrees);
+        let wrong = wrong.map(|stored| if stored { audit.worker.as_str() } else { worker });
         let reason = format!(
-            "case {index} of {campaign} by {} and {worker} differs by {difference_db:.2} dB",
+            "case {index} of {campaign} by {} and {second} differs by {difference_db:.2} dB",
             audit.worker
         );
         let finding = AuditFinding { agrees, difference_db };
         let blame = wrong.map(|wrong| (wrong, reason.as_str()));
         let kept = self.library.audited(campaign, index, worker, finding, blame).await?;
+        self.failures.lock().remove(&(campaign.clone(), index));
         if agrees || kept.is_none() {
             return Ok(Some(AuditOutcome::Agreement));
         }
@@ -220,6 +211,8 @@ impl Audits {
 
 /// Outcome of an audit.
 pub(crate) enum AuditOutcome {
+    /// The auditor could not simulate the case, and another worker will.
+    Failed,
     /// Both results agree, or the audit was completed before.
     Agreement,
     /// The results differ, and the coordinator could not determine which worker is wrong.

@@ -4,7 +4,7 @@ use super::LeaseSizer;
 use parking_lot::Mutex;
 use std::collections::HashMap;
 use std::sync::Arc;
-use tracktwin_experiment::{Experiment, ExperimentError};
+use tracktwin_experiment::{Experiment, ExperimentError, MODEL_HASH};
 use tracktwin_library::{CampaignRecord, Library, LibraryError};
 use tracktwin_protocol::Shape;
 
@@ -40,7 +40,7 @@ impl DispatchError {
             self,
             Self::Experiment { .. }
                 | Self::OtherForm { .. }
-                | Self::Library(LibraryError::Damaged { .. })
+                | Self::Library(LibraryError::Damaged { .. } | LibraryError::OtherModel { .. })
         )
     }
 }
@@ -84,12 +84,11 @@ impl Served {
 pub(crate) struct Campaigns {
     library: Library,
     known: Mutex<HashMap<String, Arc<Served>>>,
-    latest: Mutex<Option<Arc<Served>>>,
 }
 
 impl Campaigns {
     pub(crate) fn new(library: Library) -> Self {
-        Self { library, known: Mutex::default(), latest: Mutex::default() }
+        Self { library, known: Mutex::default() }
     }
 
     /// Returns a campaign of the library, from the cache if possible.
@@ -99,20 +98,16 @@ impl Campaigns {
             return Ok(served);
         }
         let served = Arc::new(Served::new(self.library.campaign(id).await?)?);
+        self.library.check_model(id, MODEL_HASH).await?;
         let mut known = self.known.lock();
         Ok(known.entry(id.to_owned()).or_insert(served).clone())
     }
 
-    /// Records the campaign leased last: the next lease is probably of the same campaign.
-    pub(crate) fn leased(&self, served: &Arc<Served>) {
-        *self.latest.lock() = Some(served.clone());
-    }
-
-    /// Probable number of cases of the next lease, from the campaign leased last.
-    pub(crate) fn cases_per_lease(&self, cores: u32) -> u32 {
-        let latest = self.latest.lock();
-        let unknown = || LeaseSizer::default().cases_per_lease(cores);
-        latest.as_ref().map_or_else(unknown, |it| it.cases_per_lease(cores))
+    /// Number of cases in a lease of each known campaign if this number of cores works; at most
+    /// `cases_max`.
+    pub(crate) fn cases_per_lease(&self, cores: u32, cases_max: u32) -> HashMap<String, u32> {
+        let size = |served: &Served| served.cases_per_lease(cores).min(cases_max);
+        self.known.lock().iter().map(|(id, served)| (id.clone(), size(served))).collect()
     }
 }
 

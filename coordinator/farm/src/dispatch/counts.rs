@@ -57,9 +57,9 @@ impl Counts {
         to.register("reports_late", "Failures of ended leases", self.late.clone());
         to.register("reports_refused", "Reports of unknown cases", self.refused.clone());
         to.register("workers_registered", "Registrations", self.registered.clone());
-        to.register("workers_unfit", "Registrations refused", self.incompatible.clone());
+        to.register("workers_refused", "Registrations refused", self.incompatible.clone());
         to.register("messages_malformed", "Malformed messages refused", self.malformed.clone());
-        to.register("workers_put_aside", "Workers suspended for failures", self.suspended.clone());
+        to.register("workers_suspended", "Suspensions of failing workers", self.suspended.clone());
         to.register("cases_audited", "Cases simulated a second time", self.audited.clone());
         to.register("cases_differed", "Audited cases that differed", self.differed.clone());
         to.register("lease_seconds", "Time to respond to a lease request", self.lease_s.clone());

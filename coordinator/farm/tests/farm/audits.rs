@@ -2,7 +2,7 @@
 
 use crate::support::{
     CORES, Coordinator, StandIn, coordinator_with, lease, library, registered, registration,
-    report, stand_in, with_checksum,
+    renewal, report, stand_in, verdicts, with_checksum,
 };
 use std::net::Ipv4Addr;
 use std::time::Duration;
@@ -12,11 +12,11 @@ use tracktwin_experiment::{
     Case, Experiment, ExperimentError, MODEL_HASH, Outcome, Prepare, Simulate,
 };
 use tracktwin_farm::campaign::Campaign;
-use tracktwin_farm::dispatch::Settings;
+use tracktwin_farm::dispatch::{Settings, Timing};
 use tracktwin_farm::embedded;
 use tracktwin_farm::security::Security;
 use tracktwin_library::WorkerState;
-use tracktwin_protocol::farm::{self as messages, CaseReport, ReportRequest};
+use tracktwin_protocol::farm::{self as messages, CaseReport, ReportRequest, Verdict};
 use tracktwin_worker::agent::{self, Config};
 
 /// A machine whose levels are all too high by 0.1 dB.
@@ -118,17 +118,95 @@ async fn what_an_auditor_gives_back_goes_to_the_next_at_once() {
         client.register(registration(auditor, MODEL_HASH)).await.unwrap();
         let audits = lease(&mut client, auditor).await;
         assert!(!audits.cases.is_empty() && audits.cases.iter().all(|case| case.epoch == 0));
-        let held = |case: &messages::LeasedCase| messages::HeldCase {
-            sobol_index: case.sobol_index,
-            epoch: case.epoch,
-        };
-        let request = messages::ReleaseRequest {
-            worker: auditor.to_owned(),
-            campaign_id: audits.campaign_id.clone(),
-            cases: audits.cases.iter().map(held).collect(),
-        };
+        let messages::RenewRequest { worker, campaign_id, cases } = renewal(&audits, auditor);
+        let request = messages::ReleaseRequest { worker, campaign_id, cases };
         client.release(request).await.unwrap();
     }
+}
+
+/// A machine that cannot simulate anything.
+struct Broken;
+
+impl Simulate for Broken {
+    fn simulate(&self, cases: &[Case]) -> Vec<Outcome> {
+        vec![Outcome::Failed { reason: "out of memory".to_owned() }; cases.len()]
+    }
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "the signature is that of a preparation")]
+fn broken(_: &Experiment) -> Result<Box<dyn Simulate>, ExperimentError> {
+    Ok(Box::new(Broken))
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn an_auditor_that_fails_is_suspended_and_its_audits_go_to_another() {
+    let coordinator = serving(0.5).await;
+    work(&coordinator, "first", stand_in).await;
+    work(&coordinator, "broken", broken).await;
+    let broken = coordinator.library.worker("broken").await.unwrap().unwrap();
+    assert_eq!(broken.state, WorkerState::Active, "{:?}", broken.reason);
+    let mut client = registered(&coordinator, "broken").await;
+    let answer = lease(&mut client, "broken").await;
+    assert!(answer.cases.is_empty() && answer.reason.contains("suspended"), "{answer:?}");
+    work(&coordinator, "third", stand_in).await;
+    let audits = coordinator.library.audits(&coordinator.campaign.id()).await.unwrap();
+    assert_eq!((audits.open, audits.differ), (0, 0));
+    assert!(audits.agree > 0);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn an_audit_that_failed_three_times_is_simulated_by_the_coordinator() {
+    for (prepare, wrong) in [(stand_in as Prepare, None), (faulty, Some("first"))] {
+        let settings = Settings {
+            prepare: stand_in,
+            audit_share: 0.2,
+            suspends_failing: false,
+            ..Settings::default()
+        };
+        let coordinator = coordinator_with(settings, Security::default(), 40).await;
+        work(&coordinator, "first", prepare).await;
+        work(&coordinator, "broken", broken).await;
+        let audits = coordinator.library.audits(&coordinator.campaign.id()).await.unwrap();
+        assert_eq!(audits.open, 0, "they are not repeated for ever: {audits:?}");
+        assert_eq!(audits.differ > 0, wrong.is_some(), "{audits:?}");
+        for name in ["first", "broken"] {
+            let worker = coordinator.library.worker(name).await.unwrap().unwrap();
+            let expected =
+                if Some(name) == wrong { WorkerState::Quarantined } else { WorkerState::Active };
+            assert_eq!(worker.state, expected, "{name}: {:?}", worker.reason);
+        }
+    }
+}
+
+#[tokio::test]
+async fn an_audit_is_leased_as_long_as_its_auditor_lives_and_outlives_the_coordinator() {
+    let timing = Timing::of_lease(Duration::from_millis(600));
+    let settings = Settings { timing, prepare: stand_in, audit_share: 1.0, ..Settings::default() };
+    let mut coordinator = coordinator_with(settings.clone(), Security::default(), 4).await;
+    let mut client = registered(&coordinator, "first").await;
+    let leased = lease(&mut client, "first").await;
+    client.report(report(&leased, "first")).await.unwrap();
+    client.register(registration("slow", MODEL_HASH)).await.unwrap();
+    // After a search that found nothing, the next one is two seconds later.
+    tokio::time::sleep(Duration::from_millis(2100)).await;
+    let audits = lease(&mut client, "slow").await;
+    assert_eq!(audits.cases.len(), 4);
+    coordinator = coordinator.restarted(settings).await;
+    let mut client = registered(&coordinator, "slow").await;
+    client.register(registration("quick", MODEL_HASH)).await.unwrap();
+    for _ in 0..12 {
+        client.renew(renewal(&audits, "slow")).await.unwrap();
+        assert!(lease(&mut client, "quick").await.cases.is_empty(), "the audits are taken");
+        tokio::time::sleep(Duration::from_millis(200)).await;
+    }
+    let mut first = report(&audits, "slow");
+    first.cases.truncate(1);
+    assert_eq!(verdicts(&mut client, first).await, [Verdict::Duplicate]);
+    let counts = coordinator.library.audits(&coordinator.campaign.id()).await.unwrap();
+    assert_eq!((counts.open, counts.agree), (3, 1));
+    // The others are no longer renewed.
+    tokio::time::sleep(Duration::from_millis(2700)).await;
+    assert_eq!(lease(&mut client, "quick").await.cases.len(), 3);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

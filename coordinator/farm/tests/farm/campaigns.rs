@@ -1,10 +1,13 @@
 //! Several campaigns at the same time, added and controlled while they are served.
 
-use crate::support::{CORES, Coordinator, coordinator_with, lease, registered, stand_in, until};
+use crate::support::{
+    CORES, Coordinator, coordinator_with, lease, registered, report, stand_in, until, with_checksum,
+};
 use tokio_util::sync::CancellationToken;
 use tracktwin_farm::campaign::{self, Campaign};
 use tracktwin_farm::dispatch::Settings;
 use tracktwin_farm::security::Security;
+use tracktwin_protocol::farm::LeaseRequest;
 use tracktwin_worker::agent::{self, Config};
 
 /// A campaign other than the built-in one.
@@ -66,4 +69,24 @@ async fn the_most_urgent_campaign_goes_first_and_a_paused_one_waits() {
     })
     .await;
     assert_eq!(answer.campaign_id, second);
+}
+
+#[tokio::test]
+async fn the_first_lease_of_a_campaign_does_not_have_the_size_of_another_campaign_s_leases() {
+    let coordinator = serving().await;
+    let other = other(600);
+    campaign::store_campaign(&coordinator.library, &other).await.unwrap();
+    let mut client = registered(&coordinator, "w").await;
+    let leased = lease(&mut client, "w").await;
+    let mut quick = report(&leased, "w");
+    for case in &mut quick.cases {
+        case.duration_s = 1e-4;
+        *case = with_checksum(case.clone());
+    }
+    client.report(quick).await.unwrap();
+    let all = LeaseRequest { worker: "w".to_owned(), cases_max: 1024 };
+    let rest = client.lease(all.clone()).await.unwrap().into_inner();
+    assert_eq!((&rest.campaign_id, rest.cases.len()), (&coordinator.campaign.id(), 16));
+    let first = client.lease(all).await.unwrap().into_inner();
+    assert_eq!((&first.campaign_id, first.cases.len()), (&other.id(), 8));
 }

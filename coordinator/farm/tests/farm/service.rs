@@ -1,14 +1,15 @@
 //! Responses and refusals of the service.
 
 use crate::support::{
-    CORES, coordinator, coordinator_with, lease, pass, registered, registration, report, stand_in,
-    until, verdicts, with_checksum,
+    CORES, StandIn, coordinator, coordinator_with, lease, pass, registered, registration, renewal,
+    report, stand_in, until, verdicts, with_checksum,
 };
 use std::num::NonZeroUsize;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use tokio_util::sync::CancellationToken;
 use tonic::Code;
-use tracktwin_experiment::{Experiment, ExperimentError, MODEL_HASH, Simulate};
+use tracktwin_experiment::{Case, Experiment, ExperimentError, MODEL_HASH, Outcome, Simulate};
 use tracktwin_farm::dispatch::{Settings, Timing};
 use tracktwin_farm::security::Security;
 use tracktwin_protocol::farm::farm_client::FarmClient;
@@ -134,6 +135,71 @@ async fn a_worker_that_is_not_registered_gets_and_gives_nothing() {
     assert_eq!(known.lease(stranger).await.unwrap_err().code(), Code::Unauthenticated);
     let refused = known.report(report(&leased, "stranger")).await.unwrap_err();
     assert_eq!(refused.code(), Code::Unauthenticated);
+}
+
+/// Takes two seconds for its cases.
+struct Slow(StandIn);
+
+/// Whether a [`Slow`] simulation has ended.
+static SLOW_ENDED: AtomicBool = AtomicBool::new(false);
+
+impl Simulate for Slow {
+    fn simulate(&self, cases: &[Case]) -> Vec<Outcome> {
+        std::thread::sleep(Duration::from_secs(2));
+        SLOW_ENDED.store(true, Ordering::Relaxed);
+        self.0.simulate(cases)
+    }
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "the signature is that of a preparation")]
+fn slow(experiment: &Experiment) -> Result<Box<dyn Simulate>, ExperimentError> {
+    Ok(Box::new(Slow(StandIn(experiment.clone()))))
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_busy_worker_registers_with_a_new_coordinator_and_keeps_its_leases() {
+    let timing = Timing::of_lease(Duration::from_secs(1));
+    let settings = Settings { timing, prepare: stand_in, ..Settings::default() };
+    let coordinator = coordinator_with(settings.clone(), Security::default(), 8).await;
+    let config = Config {
+        prepare: slow,
+        worker: "busy".to_owned(),
+        idle_exit: Some(Duration::from_millis(300)),
+        ..Config::new(coordinator.url.clone(), NonZeroUsize::MIN)
+    };
+    let holdings = config.holdings.clone();
+    let worker = tokio::spawn(agent::run(config, CancellationToken::new()));
+    let id = coordinator.campaign.id();
+    until("it holds cases", async || !holdings.of(&id).is_empty()).await;
+    let coordinator = coordinator.restarted(settings).await;
+    let restarted_unix_ms = coordinator.library.now_unix_ms();
+    until("it is seen while it is busy", async || {
+        let record = coordinator.library.worker("busy").await.unwrap().unwrap();
+        assert!(!SLOW_ENDED.load(Ordering::Relaxed), "it is no longer busy");
+        record.last_seen_unix_ms >= restarted_unix_ms
+    })
+    .await;
+    worker.await.unwrap().unwrap();
+    let last = coordinator.library.case(&id, 0).await.unwrap();
+    assert_eq!(coordinator.library.status(&id).await.unwrap().finished, 8);
+    assert_eq!(last.map(|case| case.attempts), Some(0), "no lease was lost");
+}
+
+#[tokio::test]
+async fn the_leases_of_an_unknown_worker_are_renewed_before_it_registers() {
+    let timing = Timing { lease: Duration::from_millis(1500), ..Timing::default() };
+    let settings = Settings { timing, prepare: stand_in, ..Settings::default() };
+    let coordinator = coordinator_with(settings.clone(), Security::default(), 4).await;
+    let mut client = registered(&coordinator, "w").await;
+    let leased = lease(&mut client, "w").await;
+    let coordinator = coordinator.restarted(settings).await;
+    let mut client = registered(&coordinator, "other").await;
+    for _ in 0..20 {
+        let refused = client.renew(renewal(&leased, "w")).await.unwrap_err();
+        assert_eq!(refused.code(), Code::Unauthenticated);
+        assert!(lease(&mut client, "other").await.cases.is_empty(), "a lease was lost");
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
 }
 
 #[tokio::test]

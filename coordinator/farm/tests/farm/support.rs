@@ -87,7 +87,7 @@ pub(crate) struct Coordinator {
     pub(crate) library: Library,
     pub(crate) campaign: Campaign,
     _folder: TempDir,
-    _end: DropGuard,
+    end: DropGuard,
 }
 
 pub(crate) async fn coordinator() -> Coordinator {
@@ -104,14 +104,40 @@ pub(crate) async fn coordinator_with(
     let campaign = Campaign::built_in(Some(cases)).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let library = library(&folder, &campaign).await;
-    let dispatch = Dispatch::new(library.clone(), settings, Counts::default());
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await.unwrap();
     let scheme = if security.identity_pem.is_some() { "https" } else { "http" };
     let url = format!("{scheme}://{}", listener.local_addr().unwrap());
+    let end = serving(&library, listener, settings, security);
+    Coordinator { url, library, campaign, _folder: folder, end }
+}
+
+fn serving(
+    library: &Library,
+    listener: TcpListener,
+    settings: Settings,
+    security: Security,
+) -> DropGuard {
+    let dispatch = Dispatch::new(library.clone(), settings, Counts::default());
     let stop = CancellationToken::new();
     let end = stop.clone().drop_guard();
     tokio::spawn(async move { serve(listener, dispatch, &security, stop).await });
-    Coordinator { url, library, campaign, _folder: folder, _end: end }
+    end
+}
+
+impl Coordinator {
+    /// Replaces the service by another one at the same address, of the same library.
+    pub(crate) async fn restarted(self, settings: Settings) -> Self {
+        drop(self.end);
+        let address = self.url.trim_start_matches("http://");
+        let mut listener = None;
+        until("the address is free", async || {
+            listener = TcpListener::bind(address).await.ok();
+            listener.is_some()
+        })
+        .await;
+        let end = serving(&self.library, listener.unwrap(), settings, Security::default());
+        Self { end, ..self }
+    }
 }
 
 pub(crate) async fn registered(coordinator: &Coordinator, worker: &str) -> FarmClient<Channel> {
@@ -180,6 +206,19 @@ pub(crate) fn report(lease: &messages::LeaseResponse, worker: &str) -> ReportReq
         experiment_hash: lease.experiment_hash.clone(),
         cases: lease.cases.iter().map(case).collect(),
         traceparent: lease.traceparent.clone(),
+    }
+}
+
+/// A heartbeat that names everything leased.
+pub(crate) fn renewal(leased: &messages::LeaseResponse, worker: &str) -> messages::RenewRequest {
+    let held = |case: &messages::LeasedCase| messages::HeldCase {
+        sobol_index: case.sobol_index,
+        epoch: case.epoch,
+    };
+    messages::RenewRequest {
+        worker: worker.to_owned(),
+        campaign_id: leased.campaign_id.clone(),
+        cases: leased.cases.iter().map(held).collect(),
     }
 }
 

@@ -14,13 +14,24 @@ pub(crate) struct Opened {
     pub(crate) clock: Arc<Clock>,
 }
 
+/// What a library is opened for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Access {
+    /// Reading only. A library of an earlier schema is refused; no connection can write.
+    Read,
+    /// Reading and writing. The schema is updated.
+    Write,
+    /// As [`Access::Write`]. An empty library is created if there is none.
+    Create,
+}
+
 /// Opens an existing library.
-pub(crate) async fn open(url: &str) -> Result<Opened, LibraryError> {
+pub(crate) async fn open(url: &str, access: Access) -> Result<Opened, LibraryError> {
     let target = parse(url)?;
     if target.path().is_some_and(|path| !path.is_file()) {
         return Err(LibraryError::Missing { library: target.name() });
     }
-    connect(target, false).await
+    connect(target, access).await
 }
 
 /// Opens a library, or creates an empty one.
@@ -31,7 +42,7 @@ pub(crate) async fn open_or_create(url: &str) -> Result<Opened, LibraryError> {
         let folder = folder.to_owned();
         return Err(LibraryError::NoFolder { library: target.name(), folder });
     }
-    connect(target, true).await
+    connect(target, Access::Create).await
 }
 
 fn parse(url: &str) -> Result<Target, LibraryError> {
@@ -42,14 +53,17 @@ fn parse(url: &str) -> Result<Target, LibraryError> {
     Ok(target)
 }
 
-async fn connect(target: Target, create: bool) -> Result<Opened, LibraryError> {
-    let (readers, writing, clock) = match &target {
+async fn connect(mut target: Target, access: Access) -> Result<Opened, LibraryError> {
+    let (readers, writing, clock) = match &mut target {
         Target::Sqlite(path) => {
-            let (readers, writing) = sqlite::open(path, create).await?;
+            let (readers, writing) = sqlite::open(path, access).await?;
             (readers, Some(writing), Clock::Machine)
         }
         Target::Postgres { options, name } => {
-            let (readers, clock) = postgres::open(options, name, create).await?;
+            if access == Access::Read {
+                **options = postgres::only_reading(options);
+            }
+            let (readers, clock) = postgres::open(options, name, access).await?;
             (readers, None, clock)
         }
     };

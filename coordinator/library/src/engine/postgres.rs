@@ -1,7 +1,8 @@
 //! A library on a PostgreSQL server.
 
 use super::clock::Clock;
-use super::{Connection, Readers, views};
+use super::schema_version::refuse_other_schema;
+use super::{Access, Connection, Readers, views};
 use crate::LibraryError;
 use sqlx::migrate::{MigrateError, Migrator};
 use sqlx::postgres::{PgConnectOptions, PgPoolOptions};
@@ -22,19 +23,22 @@ const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 /// Key of the advisory lock for creating views; an arbitrary unique number.
 const VIEWS_LOCK: i64 = 0x7477_696e;
 
-/// Opens the library in this database and updates its schema. Also returns the server's clock.
+/// Opens the library in this database, and updates its schema unless it is only read. Also returns the server's
+/// clock.
 pub(super) async fn open(
     options: &PgConnectOptions,
     name: &str,
-    create: bool,
+    access: Access,
 ) -> Result<(Readers, Clock), LibraryError> {
     let connected = within_bounds(options).await;
     let mut connection = connected.map_err(|error| unreachable(error, name))?;
     let is_there = refuse_foreign_database(&mut connection, name).await?;
-    if !is_there && !create {
+    if !is_there && access != Access::Create {
         return Err(LibraryError::Empty { library: name.to_owned() });
     }
-    if migrate(&mut connection, name, is_there).await? {
+    if access == Access::Read {
+        schema_to_read(&mut connection, name).await?;
+    } else if migrate(&mut connection, name, is_there).await? {
         make_views(&mut connection).await?;
     } else if views_version(&mut connection).await? < views::VERSION {
         views::made(make_views(&mut connection).await, name)?;
@@ -44,8 +48,13 @@ pub(super) async fn open(
     let readers = PgPoolOptions::new()
         .max_connections(READERS)
         .acquire_timeout(ACQUIRE_TIMEOUT)
-        .connect_lazy_with(options.clone().options([("default_transaction_read_only", "on")]));
+        .connect_lazy_with(only_reading(options));
     Ok((Readers::Postgres(readers), clock))
+}
+
+/// Options of connections that the server lets read only.
+pub(super) fn only_reading(options: &PgConnectOptions) -> PgConnectOptions {
+    options.clone().options([("default_transaction_read_only", "on")])
 }
 
 /// Opens a writing connection.
@@ -101,6 +110,27 @@ async fn refuse_foreign_database(
     }
 }
 
+/// Checks that this program can read the schema as it is.
+async fn schema_to_read(connection: &mut PgConnection, name: &str) -> Result<(), LibraryError> {
+    let found = schema_version(connection).await?;
+    refuse_other_schema(found, newest(), name)?;
+    if views_version(connection).await? < views::VERSION {
+        views::warn_of_earlier(name);
+    }
+    Ok(())
+}
+
+/// Version of the newest schema that this program knows.
+fn newest() -> i64 {
+    MIGRATIONS.iter().map(|migration| migration.version).max().unwrap_or(0)
+}
+
+/// Version of the schema of a library that is there.
+async fn schema_version(connection: &mut PgConnection) -> Result<i64, LibraryError> {
+    let ask = sqlx::query_scalar("select max(version) from _sqlx_migrations");
+    Ok(ask.fetch_one(connection).await?)
+}
+
 /// Updates the tables, and returns whether an update was needed. Without need for an update nothing is
 /// written, so that a read-only role can open the library.
 async fn migrate(
@@ -108,11 +138,9 @@ async fn migrate(
     name: &str,
     is_there: bool,
 ) -> Result<bool, LibraryError> {
-    let known = MIGRATIONS.iter().map(|migration| migration.version).max().unwrap_or(0);
+    let known = newest();
     if is_there {
-        let found: i64 = sqlx::query_scalar("select max(version) from _sqlx_migrations")
-            .fetch_one(&mut *connection)
-            .await?;
+        let found = schema_version(&mut *connection).await?;
         if found > known {
             return Err(LibraryError::NewerSchema { library: name.to_owned(), found, known });
         }

@@ -3,8 +3,8 @@
 use super::file_lock::{Identity, identity};
 use super::file_system::shared_between_hosts;
 use super::retry_budget::RetryBudget;
-use super::sqlite_schema::bring_up_to_date;
-use super::{Connection, Readers};
+use super::sqlite_schema::{bring_up_to_date, check_to_read};
+use super::{Access, Connection, Readers};
 use crate::LibraryError;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
 use sqlx::{ConnectOptions, Connection as _, SqliteConnection};
@@ -35,25 +35,47 @@ const LOG_PAGES: &str = "2048";
 /// Number of reading connections, in addition to the writing one.
 const READERS: u32 = 4;
 
-/// Opens the file and updates its schema. With `create`, initialises an empty file or creates a new one.
-pub(super) async fn open(path: &Path, create: bool) -> Result<(Readers, Connection), LibraryError> {
+/// Opens the file, and updates its schema unless it is only read. With [`Access::Create`], initialises an empty file or
+/// creates a new one.
+pub(super) async fn open(
+    path: &Path,
+    access: Access,
+) -> Result<(Readers, Connection), LibraryError> {
     refuse_what_seems_empty(path)?;
     warn_of_the_place(path);
     let options = SqliteConnectOptions::new()
         .filename(path)
-        .create_if_missing(true)
+        .create_if_missing(access != Access::Read)
+        .read_only(access == Access::Read)
         .page_size(PAGE_BYTES)
         .busy_timeout(BUSY_TIMEOUT)
         .foreign_keys(true);
     let mut connection = options.connect().await.map_err(|error| closed_to_us(error, path))?;
     let is_empty = refuse_foreign_database(&mut connection, path).await?;
-    connection.close().await?;
-    if is_empty && !create {
+    if is_empty && access != Access::Create {
         return Err(LibraryError::Empty { library: path.display().to_string() });
     }
+    let connection = if access == Access::Read {
+        check_to_read(&mut connection, path).await?;
+        connection
+    } else {
+        connection.close().await?;
+        connect_to_write(&options, path).await?
+    };
+    let readers = SqlitePoolOptions::new()
+        .max_connections(READERS)
+        .connect_lazy_with(options.create_if_missing(false).pragma("query_only", "on"));
+    let file = OpenFile::at(path)?;
+    Ok((Readers::Sqlite(readers), Connection::Sqlite(connection, file)))
+}
 
-    // Only now, since it changes the file.
+/// Opens the writing connection and updates the schema.
+async fn connect_to_write(
+    options: &SqliteConnectOptions,
+    path: &Path,
+) -> Result<SqliteConnection, LibraryError> {
     let options = options
+        .clone()
         .journal_mode(SqliteJournalMode::Wal)
         .synchronous(SqliteSynchronous::Full)
         .pragma("wal_autocheckpoint", LOG_PAGES);
@@ -67,11 +89,7 @@ pub(super) async fn open(path: &Path, create: bool) -> Result<(Readers, Connecti
         }
     };
     bring_up_to_date(&mut connection, path).await?;
-    let readers = SqlitePoolOptions::new()
-        .max_connections(READERS)
-        .connect_lazy_with(options.create_if_missing(false).pragma("query_only", "on"));
-    let file = OpenFile::at(path)?;
-    Ok((Readers::Sqlite(readers), Connection::Sqlite(connection, file)))
+    Ok(connection)
 }
 
 /// Identity of the open file, to detect that its path no longer leads to it. Data written to a removed or

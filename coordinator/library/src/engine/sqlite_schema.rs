@@ -1,5 +1,6 @@
 //! The schema of a library in a file: numbered migrations, and views.
 
+use super::schema_version::refuse_other_schema;
 use super::views;
 use crate::LibraryError;
 use sqlx::migrate::{MigrateError, Migrator};
@@ -14,7 +15,7 @@ pub(super) async fn bring_up_to_date(
     connection: &mut SqliteConnection,
     path: &Path,
 ) -> Result<(), LibraryError> {
-    let known = MIGRATIONS.iter().map(|migration| migration.version).max().unwrap_or(0);
+    let known = newest();
     let newer = |error| match error {
         MigrateError::VersionMissing(found) if found > known => {
             LibraryError::NewerSchema { library: path.display().to_string(), found, known }
@@ -22,8 +23,7 @@ pub(super) async fn bring_up_to_date(
         other => other.into(),
     };
     // Fails where there is no such table yet.
-    let ask = sqlx::query_scalar("select max(version) from _sqlx_migrations");
-    let found: i64 = ask.fetch_one(&mut *connection).await.unwrap_or(0);
+    let found = schema_version(&mut *connection).await.unwrap_or(0);
     if found >= known {
         MIGRATIONS.run(&mut *connection).await.map_err(newer)?;
         return views::made(renew_views(connection).await, &path.display().to_string());
@@ -36,6 +36,41 @@ pub(super) async fn bring_up_to_date(
     MIGRATIONS.run(&mut *alone).await.map_err(newer)?;
     sqlx::raw_sql(views::SQLITE).execute(&mut *alone).await?;
     Ok(alone.commit().await?)
+}
+
+/// Checks that this program can read the schema as it is. A schema that is damaged is not refused: verification and
+/// salvage read what is there.
+pub(super) async fn check_to_read(
+    connection: &mut SqliteConnection,
+    path: &Path,
+) -> Result<(), LibraryError> {
+    let library = path.display().to_string();
+    match versions(connection).await {
+        Ok((schema, views)) => {
+            refuse_other_schema(schema, newest(), &library)?;
+            if views < views::VERSION {
+                views::warn_of_earlier(&library);
+            }
+            Ok(())
+        }
+        Err(error) if error.is_of_the_database() => Ok(()),
+        Err(error) => Err(error),
+    }
+}
+
+/// Versions of the schema and of its views.
+async fn versions(connection: &mut SqliteConnection) -> Result<(i64, i64), LibraryError> {
+    Ok((schema_version(connection).await?, views_version(connection).await?))
+}
+
+/// Version of the newest schema that this program knows.
+fn newest() -> i64 {
+    MIGRATIONS.iter().map(|migration| migration.version).max().unwrap_or(0)
+}
+
+async fn schema_version(connection: &mut SqliteConnection) -> Result<i64, LibraryError> {
+    let ask = sqlx::query_scalar("select max(version) from _sqlx_migrations");
+    Ok(ask.fetch_one(connection).await?)
 }
 
 /// Creates the views again if the existing ones are of an earlier version.

@@ -1,6 +1,6 @@
 //! The views: one SQL file per database, outside the numbered migrations.
 //!
-//! Opening a library creates the views again if the existing ones are of an earlier version.
+//! Opening a library for writing creates the views again if the existing ones are of an earlier version.
 
 use crate::LibraryError;
 
@@ -9,6 +9,13 @@ pub(super) const VERSION: i64 = 2;
 
 pub(super) const SQLITE: &str = include_str!("../../../../migrations/sqlite/views.sql");
 pub(super) const POSTGRES: &str = include_str!("../../../../migrations/postgres/views.sql");
+
+/// Logs that a library is read by views of an earlier version.
+pub(super) fn warn_of_earlier(library: &str) {
+    tracing::warn!(
+        "library {library}: its views are of an earlier version; `tracktwin library upgrade` renews them"
+    );
+}
 
 /// Logs a failure to update the views as a warning if the existing views are still usable. This is the case
 /// for read-only access and for the salvage of a damaged library.

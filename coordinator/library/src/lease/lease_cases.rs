@@ -170,11 +170,9 @@ impl LeaseCases {
         campaign: &str,
         from: u32,
     ) -> Result<Vec<Waiting>, LibraryError> {
-        let ask = sql(WAITING)
-            .bind(campaign)
-            .bind(from)
-            .bind(self.request.indices_below)
-            .bind(self.request.cases_max);
+        let LeaseRequest { indices_below, cases_max, cases_max_of, .. } = &self.request;
+        let cases_max = cases_max_of.get(campaign).unwrap_or(cases_max);
+        let ask = sql(WAITING).bind(campaign).bind(from).bind(*indices_below).bind(*cases_max);
         let waiting = |row: &Row| {
             let leased = Leased { case: case_of(row)?, epoch: row.get_u32("epoch")? + 1 };
             Ok(Waiting { leased, attempts: row.get_u32("attempts")? })

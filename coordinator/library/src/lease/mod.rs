@@ -9,6 +9,7 @@ pub(crate) use queue_cursor::QueueCursor;
 use crate::{AttemptsMax, Library, LibraryError};
 use hold::{Release, ReleaseAll, Renew};
 use lease_cases::LeaseCases;
+use std::collections::HashMap;
 use tracktwin_parameters::Case;
 
 /// A worker's request for cases.
@@ -21,8 +22,10 @@ pub struct LeaseRequest {
     pub indices_below: u32,
     /// Name of the worker.
     pub worker: String,
-    /// Maximum number of cases.
+    /// Maximum number of cases of a campaign that is not in `cases_max_of`.
     pub cases_max: u32,
+    /// Maximum number of cases of these campaigns, by id.
+    pub cases_max_of: HashMap<String, u32>,
     /// Leases of this worker that are known to be held, because the worker runs in this process. They
     /// belong to `campaign`. They do not expire, even if heartbeats are late.
     pub held: Vec<Held>,

@@ -18,6 +18,8 @@ pub(crate) struct StoredCase {
     pub(crate) passes: Vec<PassFeatures>,
     /// Checksum of the worker; `None` if a version without checksums stored the result.
     checksum: Option<String>,
+    /// Version of the physics that computed the results.
+    pub(crate) model_hash: String,
 }
 
 /// Result of comparing stored data with the checksum of their worker.
@@ -34,7 +36,8 @@ pub(crate) enum Attested {
 impl StoredCase {
     fn of(row: &Row) -> Result<Self, LibraryError> {
         let (case, passes) = (case_of(row)?, vec![pass_of(row)?]);
-        Ok(Self { case, passes, checksum: row.get("checksum")? })
+        let (checksum, model_hash) = (row.get("checksum")?, row.get("model_hash")?);
+        Ok(Self { case, passes, checksum, model_hash })
     }
 
     fn add(&mut self, row: &Row) -> Result<(), LibraryError> {

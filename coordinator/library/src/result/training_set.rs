@@ -3,6 +3,7 @@
 use super::entry::LibraryEntry;
 use super::stored::StoredCase;
 use crate::digest::Digest;
+use crate::model::OneModel;
 use crate::{Library, LibraryError};
 
 impl Library {
@@ -12,8 +13,8 @@ impl Library {
     /// Only one entry is in memory at a time, independent of the number of cases.
     ///
     /// # Errors
-    /// Returns [`LibraryError`] if the library cannot be read, a case lacks a speed, or its results do not
-    /// match their checksum.
+    /// Returns [`LibraryError`] if the library cannot be read, a case lacks a speed, its results do not match
+    /// their checksum, or several models have computed the results.
     pub async fn training_set(
         &self,
         campaign: &str,
@@ -21,7 +22,9 @@ impl Library {
     ) -> Result<String, LibraryError> {
         let speeds = self.campaign(campaign).await?.speeds_km_h.len();
         let mut digest = Digest::new();
+        let mut model = OneModel::of(campaign);
         let complete = |case: StoredCase| {
+            model.check(&case)?;
             digest.add(&case);
             complete(case, speeds).map(&mut take)
         };

@@ -160,6 +160,8 @@ impl Scenario {
         let audits = library.audit_sample(CAMPAIGN, "b", 3, 1000).await.unwrap();
         self.done("an audit is handed out");
         let index = audits[0].case.index;
+        library.renew_audits(CAMPAIGN, "b", vec![index], 1000).await.unwrap();
+        self.done("a heartbeat: audits that it names are renewed");
         library.release_audits(CAMPAIGN, "b", vec![index]).await.unwrap();
         self.done("an audit is handed back");
         library.audit_sample(CAMPAIGN, "b", 3, 1000).await.unwrap();

@@ -1,5 +1,6 @@
 //! A library in either database, and a campaign for tests.
 
+use std::collections::HashMap;
 use tempfile::TempDir;
 use test_postgres::Server;
 use tracktwin_experiment::{Outcome, PassFeatures};
@@ -139,6 +140,7 @@ pub(crate) fn request(worker: &str, max: u32, now: i64) -> LeaseRequest {
         indices_below: u32::MAX,
         worker: worker.to_owned(),
         cases_max: max,
+        cases_max_of: HashMap::new(),
         held: Vec::new(),
         now_unix_ms: now,
         lease_ms: 1000,

@@ -2,6 +2,7 @@
 
 use crate::support::{GIVE_UP, Home};
 use sqlx::{AssertSqlSafe, Connection, PgConnection, SqliteConnection};
+use std::collections::HashMap;
 use tracktwin_library::{LeaseRequest, Library, State, Status};
 
 pub(crate) const CAMPAIGN: &str = "released-13c0db7b51c4";
@@ -41,6 +42,7 @@ async fn a_library_of_the_first_schema_is_gone_on_with() {
         indices_below: u32::MAX,
         worker: "w".to_owned(),
         cases_max: 9,
+        cases_max_of: HashMap::new(),
         held: Vec::new(),
         // Its lease has expired long ago.
         now_unix_ms: library.now_unix_ms(),

@@ -91,7 +91,7 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
     };
     let names: Vec<&str> = tables.iter().map(|(_, name)| name.as_str()).collect();
     check(&folder, Kind::Export, *force, &names)?;
-    let library = library.open().await?;
+    let library = library.open_to_read().await?;
     let mut output = Output::begin(&folder, Kind::Export, force.force)?;
     let mut written = Vec::new();
     for &(table, ref name) in &tables {

@@ -7,6 +7,7 @@ mod files;
 mod import;
 mod sql;
 mod status;
+mod upgrade;
 mod verify;
 
 use super::{OrInput, Stop, print_json, println_stderr, println_stdout};
@@ -32,6 +33,8 @@ pub(super) enum Question {
     /// Copy a library into another, SQLite or PostgreSQL; repeat the command to continue an
     /// interrupted copy.
     Copy(copy::Arguments),
+    /// Update the schema of a library that an earlier version wrote. Stop its coordinators first.
+    Upgrade(LibraryUrl),
     /// Verify integrity: hashes, gaps, duplicates, NaN and infinite values.
     #[command(after_help = "\
 `tracktwin library copy` copies the intact rows to another library. `tracktwin campaign retry
@@ -59,12 +62,13 @@ pub(super) async fn run(question: Question) -> Result<(), Stop> {
         Question::Export(arguments) => export::run(&arguments).await,
         Question::Import(arguments) => import::run(&arguments).await,
         Question::Copy(arguments) => copy::run(&arguments).await,
+        Question::Upgrade(url) => upgrade::run(&url).await,
         Question::Verify(which) => verify::run(&which).await,
     }
 }
 
 async fn open(url: &LibraryUrl) -> Result<(Library, Vec<CampaignRecord>), Stop> {
-    let library = url.open().await?;
+    let library = url.open_to_read().await?;
     let campaigns = library.campaigns().await?;
     Ok((library, campaigns))
 }

@@ -41,7 +41,7 @@ enum Format {
 }
 
 pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
-    let library = arguments.library.open().await?;
+    let library = arguments.library.open_to_read().await?;
     let mut printer = Printer {
         out: BufWriter::new(io::stdout().lock()),
         format: arguments.format,

@@ -10,7 +10,7 @@ const UNCHECKED: &str = "not checked: worker, time and duration of a case; attem
                          scores of trainings; contents of estimates, findings and trials";
 
 pub(super) async fn run(which: &Which) -> Result<(), Stop> {
-    let (name, verified) = match which.library.open().await {
+    let (name, verified) = match which.library.open_to_read().await {
         Ok(library) => (library.name(), verify(&library).await?),
         Err(Stop::Input(error) | Stop::Failure(error)) if says_what_is_there(&error) => {
             let (place, what) = (which.library.name(), format!("{error:#}"));

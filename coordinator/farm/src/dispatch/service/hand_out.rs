@@ -3,7 +3,7 @@
 use super::{Dispatch, unix_ms};
 use crate::dispatch::campaigns::{DispatchError, Served};
 use crate::dispatch::messages::unavailable;
-use crate::dispatch::{ATTEMPTS_MAX, SUSPECT_AFTER};
+use crate::dispatch::{ATTEMPTS_MAX, LeaseSizer, SUSPECT_AFTER};
 use std::time::Duration;
 use tokio::time::Instant;
 use tonic::Status;
@@ -30,11 +30,13 @@ impl Dispatch {
             return Ok(self.none_now());
         }
         let scope = self.settings.scope.as_ref();
+        let cores = self.roster.present().1;
         let request = LeaseRequest {
             campaign: scope.map(|scope| scope.campaign.clone()),
             indices_below: scope.map_or(u32::MAX, |scope| scope.cases),
             worker: worker.to_owned(),
-            cases_max: cases_max.min(self.campaigns.cases_per_lease(self.roster.present().1)),
+            cases_max: cases_max.min(LeaseSizer::default().cases_per_lease(cores)),
+            cases_max_of: self.campaigns.cases_per_lease(cores, cases_max),
             held: self.held_here(),
             now_unix_ms: self.now_unix_ms(),
             lease_ms: unix_ms(self.settings.timing.lease),
@@ -49,7 +51,6 @@ impl Dispatch {
         };
         match self.campaigns.of(&leased.campaign).await {
             Ok(served) => {
-                self.campaigns.leased(&served);
                 self.counts.leased.inc_by(leased.cases.len() as u64);
                 let cases = leased.cases.into_iter();
                 let cases = cases.map(|it| LeasedCase { case: it.case, epoch: it.epoch });

@@ -149,18 +149,18 @@ impl Farm for Dispatch {
         &self,
         request: Request<farm::RenewRequest>,
     ) -> Result<Response<farm::RenewResponse>, Status> {
-        // Without registration too: leases outlive a restart of the coordinator.
+        // Leases outlive a restart of the coordinator, so they are renewed before the worker registers again.
         let farm::RenewRequest { worker, campaign_id, cases } = request.into_inner();
         let [worker, campaign_id] = names(worker, campaign_id)?;
+        let (audits, held) = audits_and_cases(cases)?;
+        if !audits.is_empty() {
+            let renewed = self.audits.renew(&worker, &campaign_id, audits).await;
+            renewed.map_err(|error| unavailable(&error))?;
+        }
         let until = self.now_unix_ms().saturating_add(unix_ms(self.settings.timing.lease));
-        // Audits are not leases of the library, and long enough.
-        let is_case = |held: &Held| LeaseKind::of(held.epoch) == LeaseKind::Case;
-        let held = held(cases)?.into_iter().filter(is_case).collect();
         let lost = self.library.renew(&campaign_id, &worker, held, until).await;
         let lost = lost.map_err(|error| unavailable(&error))?;
-        if self.roster.eligibility(&worker).is_some_and(|eligibility| eligibility.to_be_noted) {
-            self.note(&worker).await?;
-        }
+        self.eligibility(&worker).await?;
         let lost = held_to_messages(lost.into_iter().map(|held| (held.index, held.epoch)));
         Ok(Response::new(farm::RenewResponse { lost }))
     }
@@ -178,7 +178,10 @@ impl Farm for Dispatch {
         let indices: Vec<u32> = cases.iter().map(|case| case.sobol_index).collect();
         let served = match self.campaigns.of(&campaign_id).await {
             Ok(served) => Some(served).filter(|it| it.record.experiment_hash == experiment_hash),
-            Err(DispatchError::Library(library::LibraryError::UnknownCampaign { .. })) => None,
+            Err(DispatchError::Library(
+                library::LibraryError::UnknownCampaign { .. }
+                | library::LibraryError::OtherModel { .. },
+            )) => None,
             Err(error) => return Err(Status::unavailable(error.to_string())),
         };
         let verdicts = if let Some(served) = served {
@@ -206,18 +209,22 @@ impl Farm for Dispatch {
     ) -> Result<Response<farm::ReleaseResponse>, Status> {
         let farm::ReleaseRequest { worker, campaign_id, cases } = request.into_inner();
         let [worker, campaign_id] = names(worker, campaign_id)?;
-        let (audits, held): (Vec<_>, Vec<_>) = held(cases)?
-            .into_iter()
-            .partition(|held| LeaseKind::of(held.epoch) == LeaseKind::Audit);
+        let (audits, held) = audits_and_cases(cases)?;
         if !audits.is_empty() {
-            let indices = audits.into_iter().map(|held| held.index).collect();
-            let released = self.audits.release(&worker, &campaign_id, indices).await;
+            let released = self.library.release_audits(&campaign_id, &worker, audits).await;
             released.map_err(|error| unavailable(&error))?;
         }
         let released = self.library.release(&campaign_id, &worker, held).await;
         released.map_err(|error| unavailable(&error))?;
         Ok(Response::new(farm::ReleaseResponse {}))
     }
+}
+
+/// The indices of the audits among these leases, and the leases of cases.
+fn audits_and_cases(messages: Vec<farm::HeldCase>) -> Result<(Vec<u32>, Vec<Held>), Status> {
+    let is_audit = |held: &Held| LeaseKind::of(held.epoch) == LeaseKind::Audit;
+    let (audits, cases): (Vec<_>, Vec<_>) = held(messages)?.into_iter().partition(is_audit);
+    Ok((audits.into_iter().map(|held| held.index).collect(), cases))
 }
 
 /// Checks the names of a worker and of a campaign in a message, and returns both.

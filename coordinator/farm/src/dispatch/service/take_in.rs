@@ -89,14 +89,19 @@ impl Dispatch {
         step.count("cases_stored", failed.len());
         drop(step);
         served.measured(durations_s);
-        if self.settings.suspends_failing && self.roster.reported(worker, &failed) {
+        self.record_failures(worker, &failed);
+        Ok(verdicts)
+    }
+
+    /// Records which of a worker's cases failed, and suspends a failing worker.
+    fn record_failures(&self, worker: &str, failed: &[bool]) {
+        if self.settings.suspends_failing && self.roster.reported(worker, failed) {
             tracing::warn!(
                 worker,
                 "worker suspended: its cases fail, those of other workers do not"
             );
             self.counts.suspended.inc();
         }
-        Ok(verdicts)
     }
 
     async fn audited(
@@ -105,28 +110,29 @@ impl Dispatch {
         served: &Arc<Served>,
         report: CaseReport,
     ) -> Result<ReportVerdict, Status> {
+        let failed = matches!(report.outcome, Outcome::Failed { .. });
         let found = self.audits.report(worker, served, report).await;
-        Ok(match found.map_err(|error| unavailable(&error))? {
-            None => {
-                self.counts.refused.inc();
-                ReportVerdict::Refused
-            }
-            Some(AuditOutcome::Agreement) => {
+        let Some(outcome) = found.map_err(|error| unavailable(&error))? else {
+            self.counts.refused.inc();
+            return Ok(ReportVerdict::Refused);
+        };
+        self.record_failures(worker, &[failed]);
+        match outcome {
+            AuditOutcome::Failed => {}
+            AuditOutcome::Agreement => {
                 self.counts.audited.inc();
-                ReportVerdict::Duplicate
             }
-            Some(AuditOutcome::Unjudged) => {
+            AuditOutcome::Unjudged => {
                 self.counts.audited.inc();
                 self.counts.differed.inc();
-                ReportVerdict::Duplicate
             }
-            Some(AuditOutcome::Wrong { worker, reason }) => {
+            AuditOutcome::Wrong { worker, reason } => {
                 self.counts.audited.inc();
                 self.counts.differed.inc();
                 self.roster.set_quarantine(&worker, Some(reason));
-                ReportVerdict::Duplicate
             }
-        })
+        }
+        Ok(ReportVerdict::Duplicate)
     }
 
     fn count(&self, verdicts: &[ReportVerdict]) {

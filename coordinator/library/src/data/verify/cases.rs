@@ -7,7 +7,7 @@ use crate::{CampaignRecord, LibraryError};
 use tokio_stream::StreamExt;
 
 /// Statements that find the indices of cases with a fault; `$1` is the campaign.
-const FAULTS: [(&str, Text); 7] = [
+const FAULTS: [(&str, Text); 8] = [
     (
         "finished cases without a result at every speed",
         Text::Each {
@@ -43,6 +43,15 @@ const FAULTS: [(&str, Text); 7] = [
             "select distinct sobol_index from result
         where campaign_id = $1
             and experiment_hash <> (select experiment_hash from campaign where id = $1)",
+        ),
+    ),
+    (
+        "results of another model than the first case's",
+        Text::same(
+            "select distinct sobol_index from result
+        where campaign_id = $1 and model_hash <> (
+            select model_hash from result where campaign_id = $1
+            order by sobol_index, speed_km_h limit 1)",
         ),
     ),
     (

@@ -364,6 +364,16 @@ order by sobol_index;
 --       ->  Index Scan using a_case_has_one_place_in_its_campaign on campaign_case
 --             Index Cond: ((campaign_id = $1) AND (sobol_index = ANY ($2)))
 
+-- ## a heartbeat: audits that it names are renewed
+
+-- 1
+update audit set lease_expires_unix_ms = $4
+where campaign_id = $1 and auditor = $2 and state = 'leased' and sobol_index = any($3);
+--     Update on audit
+--       ->  Index Scan using audit_that_is_open on audit
+--             Index Cond: ((state = 'leased'::text) AND (campaign_id = $1))
+--             Filter: ((auditor = $2) AND (sobol_index = ANY ($3)))
+
 -- ## an audit is handed back
 
 -- 1

@@ -296,6 +296,17 @@ order by sobol_index;
 --     SCAN json_each VIRTUAL TABLE INDEX 1:
 --     CREATE BLOOM FILTER
 
+-- ## a heartbeat: audits that it names are renewed
+
+-- 1
+update audit set lease_expires_unix_ms = $4
+where campaign_id = $1 and auditor = $2 and state = 'leased'
+    and sobol_index in (select value from json_each($3));
+--     SEARCH audit USING PRIMARY KEY (campaign_id=? AND sobol_index=?)
+--     LIST SUBQUERY 1
+--     SCAN json_each VIRTUAL TABLE INDEX 1:
+--     CREATE BLOOM FILTER
+
 -- ## an audit is handed back
 
 -- 1
