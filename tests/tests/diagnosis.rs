@@ -129,13 +129,17 @@ fn an_uneven_wheel_that_was_found_joins_a_campaign_with_its_order() {
 
 #[test]
 fn with_one_speed_nothing_is_more_certain_than_a_half() {
-    let folder = recorded(&["13"], JOINT);
-    let (_, diagnosis) = diagnosed(folder.path(), &[]);
-    let diagnosis = diagnosis.unwrap();
-    let most = diagnosis["hypotheses"][0]["probability"].as_f64().unwrap();
-    assert!(most <= 0.5, "{most}");
-    let notes = diagnosis["notes"].to_string();
-    assert!(notes.contains("One speed only") && notes.contains("Add a pass at 10 km/h"), "{notes}");
+    for (speeds, other) in [(&["13"][..], "10 km/h"), (&["13", "12.6"], "9 km/h")] {
+        let folder = recorded(speeds, JOINT);
+        let (_, diagnosis) = diagnosed(folder.path(), &[]);
+        let diagnosis = diagnosis.unwrap();
+        let most = diagnosis["hypotheses"][0]["probability"].as_f64().unwrap();
+        assert!(most <= 0.5, "{speeds:?}: {most}");
+        let notes = diagnosis["notes"].to_string();
+        let is_said =
+            notes.contains("One speed only") && notes.contains(&format!("Add a pass at {other}"));
+        assert!(is_said, "{notes}");
+    }
 }
 
 #[test]

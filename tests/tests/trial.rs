@@ -19,7 +19,8 @@ fn record(out: &Path, [spans, passes]: [&str; 2]) {
     for case in ["0000", "0001"] {
         let recording = out.join("recordings").join(case).display().to_string();
         let short = ["simulate", "--spans", spans, "--speed", "13", "--passes", passes];
-        assert_eq!(run(PROGRAM, &[&short[..], &["--out", &recording]].concat()).code, Some(0));
+        let further = ["--noise", "0.01", "--out", &recording];
+        assert_eq!(run(PROGRAM, &[&short[..], &further].concat()).code, Some(0));
     }
 }
 

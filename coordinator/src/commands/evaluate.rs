@@ -3,6 +3,7 @@
 use super::accepted::{diagnosis_of, with_physics};
 use super::files::{Force, check, make_folder};
 use super::library_url::{open_or_create, open_whole};
+use super::models::load_models;
 use super::progress::Stages;
 use super::recording::{RecordingArgument, open, usable_with_notes};
 use super::track::TrackOption;
@@ -227,15 +228,6 @@ fn inversion_summary(inversion: &Inversion, folder: &Path) -> Value {
         "sleepers": inversion.sleepers.len(), "outside_library": inversion.outside_library,
         "notes": inversion.notes, "report": report(folder),
     })
-}
-
-/// Reads the trained models in a folder.
-pub(super) fn load_models(folder: &Path) -> Result<Trained, Stop> {
-    Trained::load(folder)
-        .with_context(|| {
-            format!("{}: no models found; create them with `tracktwin train`", folder.display())
-        })
-        .or_input()
 }
 
 /// Files of an evaluation.

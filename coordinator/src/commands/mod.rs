@@ -22,6 +22,7 @@ mod inspect;
 mod library;
 mod library_url;
 mod manual;
+mod models;
 mod new;
 mod numbers;
 mod progress;

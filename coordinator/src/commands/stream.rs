@@ -1,7 +1,7 @@
 //! `tracktwin stream`: estimates of the track parameters while a pass is recorded.
 
-use super::evaluate::load_models;
 use super::library_url::LibraryUrl;
+use super::models::load_models;
 use super::recording::check_sleepers;
 use super::{OrInput, Stop, println_stderr, write_stdout};
 use crate::pipeline::compute::compute;

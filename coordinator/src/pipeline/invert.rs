@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tracktwin_diagnosis::{
     CalibrationError, Candidate, Common, Diagnosis, PreparationError, PreparedRecording,
-    first_calibration,
+    check_length, first_calibration,
 };
 use tracktwin_evaluation::Flag;
 use tracktwin_inspection::{Finding, Inspection, inspect};
@@ -48,6 +48,7 @@ pub async fn invert(
     library: Option<&Library>,
     watch: &(dyn Fn(&'static str, f64) + Sync),
 ) -> Result<Inversion, InvertingError> {
+    check_length(recording)?;
     watch("spectra", 0.0);
     let inspection = compute(|| inspect(recording));
     let left_out = inspection.notes_on_not_compared(recording);
@@ -139,4 +140,22 @@ fn alike(mut started: Vec<Started>) -> Vec<Started> {
         }
     }
     started
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn too_short_a_recording_is_refused_before_anything_is_computed() {
+        let mut recording =
+            Recording::open(concat!(env!("CARGO_MANIFEST_DIR"), "/sample")).unwrap();
+        recording.sleepers.truncate(5);
+        let track = recording.stated_track().track;
+        let watch = |stage: &'static str, _| panic!("{stage} before the refusal");
+        let Err(error) = invert(&recording, &track, None, None, &watch).await else {
+            panic!("five sleepers are not enough")
+        };
+        assert!(error.to_string().contains("needs 6 or more"), "{error}");
+    }
 }

@@ -6,7 +6,7 @@ use super::train::{self, TrainingError};
 use std::path::Path;
 use tracktwin_files::{FileName, FilesError, Kind, Output};
 use tracktwin_library::{CampaignRecord, Library};
-use tracktwin_surrogate::{GroupKey, Tested, Trained};
+use tracktwin_surrogate::{GroupKey, INDEX, Tested, Trained};
 
 /// Files that are written in addition to those of [`Trained`].
 const PAGE: &str = "models.html";
@@ -44,7 +44,7 @@ impl ModelsError {
 /// # Errors
 /// Returns [`FilesError`] with the path of a file that must not be replaced.
 pub fn check_files(folder: &Path, force: bool) -> Result<(), FilesError> {
-    tracktwin_files::check(folder, Kind::Models, force, &[PAGE, SCORES, "models.json"])
+    tracktwin_files::check(folder, Kind::Models, force, &[PAGE, SCORES, INDEX])
 }
 
 /// Trains on a campaign, and saves the models and their errors in `folder`. `seed` determines which half of

@@ -3,7 +3,7 @@
 use super::super::track::stated;
 use tracktwin_diagnosis::{PreparationError, check_track, passes_alone};
 use tracktwin_evaluation::check_recording;
-use tracktwin_inspection::{Inspection, chain, inspect, separates_wavelengths};
+use tracktwin_inspection::{Inspection, chain, inspect, separate_wavelengths};
 use tracktwin_inversion::sections;
 use tracktwin_number::rounded;
 use tracktwin_signal::SAMPLES_A_PERIOD;
@@ -104,7 +104,7 @@ fn limits(recording: &Recording, inspection: &Inspection) -> Vec<String> {
             rounded(rate, 8),
         ));
     }
-    if !separates_wavelengths(&recording.passes) {
+    if !separate_wavelengths(&recording.speeds_km_h()) {
         let fastest = recording.speeds_km_h().into_iter().fold(0.0, f64::max);
         limits.push(format!(
             "one speed only: effects of constant frequency (structure) and of constant wavelength \

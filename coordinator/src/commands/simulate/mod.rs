@@ -44,7 +44,7 @@ const TRUTH: &str = "truth.json";
 #[derive(Args)]
 #[command(after_help = "\
 Example:
-  tracktwin simulate --passes 2 --set ballast_stiffness_N_m@SN12=4e6 --out ride
+  tracktwin simulate --passes 2 --noise 0.05 --set ballast_stiffness_N_m@SN12=4e6 --out ride
 
 Parameters of --set: railpad_stiffness_N_m, railpad_damping_N_s_m, ballast_stiffness_N_m,
 ballast_damping_N_s_m, sleeper_EI_N_m2, irregularity_level.

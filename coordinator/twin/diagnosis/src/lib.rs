@@ -58,7 +58,7 @@ pub use outcome::{
 pub use patch_scan::{Fixed, Patch};
 pub use port_scan::{PortPlace, PortScan, UnknownElement};
 pub use prepared_recording::{
-    PreparationError, PreparedRecording, check_track, highest_compared_hz,
+    PreparationError, PreparedRecording, check_length, check_track, highest_compared_hz,
 };
 pub use quantity::{Common, Own};
 pub use screen::{Template, templates};

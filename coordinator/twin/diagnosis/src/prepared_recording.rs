@@ -2,9 +2,10 @@
 
 mod sleepers;
 
+pub use self::sleepers::check_length;
 pub(crate) use self::sleepers::overlapping;
 
-use self::sleepers::covered;
+use self::sleepers::{covered, too_short};
 use crate::bands::Bands;
 use crate::forward::Forward;
 use crate::null_model::NullModel;
@@ -191,8 +192,7 @@ impl Measured {
         }
         let sleepers = covered(recording, except);
         if sleepers.len() < SLEEPERS_MIN {
-            let margin_m = MARGIN_SPANS * recording.spacing_m;
-            return Err(PreparationError::TooShort { sleepers: sleepers.len(), margin_m });
+            return Err(too_short(recording, sleepers.len()));
         }
         let spectra = Spectra::new(recording, &bands, except);
         Ok(Self { bands, spectra, sleepers })

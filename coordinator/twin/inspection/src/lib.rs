@@ -12,6 +12,6 @@ pub mod impact;
 mod inspect;
 pub mod wheel;
 
-pub use along::{median, separates_wavelengths};
+pub use along::{SPEED_RATIO, median, separate_wavelengths};
 pub use finding::{Finding, Place};
 pub use inspect::{FALSE_ALARMS, Inspection, inspect};

@@ -10,17 +10,17 @@ const SPOT: f64 = 1.0;
 
 impl Fitted {
     /// Version of the fit. Stored sections of another version are fitted again.
-    pub const VERSION: u32 = 4;
+    pub const VERSION: u32 = 5;
 
-    /// The fit as numbers: values, deviations, misfits, variations, the number of support changes, six numbers for
-    /// each of them, and a pair for each exception.
+    /// The fit as numbers: values, deviations, misfits, variations, the deviation of the railpads' damping, the number
+    /// of support changes, six numbers for each of them, and a pair for each exception.
     pub fn numbers(&self) -> Vec<f64> {
         let Self { unknowns, values, deviations, changes, misfit } = self;
         let mut numbers = [values.as_slice(), deviations.as_slice(), misfit].concat();
         numbers.extend(
             unknowns.variation.iter().flat_map(|it| [it.smooth, it.length, it.independent]),
         );
-        numbers.push(changes.len() as f64);
+        numbers.extend([unknowns.railpad_damping_deviation, changes.len() as f64]);
         for (&change, &Amplitude { log, deviation, probability }) in
             unknowns.support_changes.iter().zip(changes)
         {
@@ -46,8 +46,9 @@ impl Fitted {
         for (of, numbers) in unknowns.variation.iter_mut().zip(variation.chunks_exact(3)) {
             *of = Variation { smooth: numbers[0], length: numbers[1], independent: numbers[2] };
         }
-        let (count, rest) = rest.split_first()?;
-        let (stored, exceptions) = rest.split_at_checked(6 * *count as usize)?;
+        let (&[railpad_damping_deviation, count], rest) = rest.split_first_chunk()?;
+        unknowns.railpad_damping_deviation = railpad_damping_deviation;
+        let (stored, exceptions) = rest.split_at_checked(6 * count as usize)?;
         let change = |numbers: &[f64]| {
             let (first, last) = (numbers[1] as usize, numbers[2] as usize);
             if numbers[0] == TRANSITION {
@@ -91,6 +92,7 @@ mod tests {
         let section = crate::sections(&recording, &track).unwrap().remove(0);
         let mut unknowns = unknowns_of(&section.forward);
         unknowns.variation[1] = Variation { smooth: 0.2, length: 5.0, independent: 0.1 };
+        unknowns.railpad_damping_deviation *= 0.5;
         unknowns.exceptions = vec![Exception { field: Own::RailpadStiffness, sleeper: 3 }];
         let spot = SupportChange::Spot { first: 4, last: 7 };
         unknowns.support_changes = vec![SupportChange::Transition { before: 2, after: 3 }, spot];

@@ -59,7 +59,7 @@ pub use kernel::{Hyperparameters, correlation};
 pub use selector::{Neighbour, Selection, Selector, mape};
 pub use spread::Spread;
 pub use stack::Stack;
-pub use store::{FORMAT, Trained};
+pub use store::{FORMAT, INDEX, Trained};
 pub use train::{ENTRIES_MIN, Progress, TrainOptions, train};
 pub use training_set::{Split, TrainingSet};
 pub use validate::{Folds, coverage, folds, mase};

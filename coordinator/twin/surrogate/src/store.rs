@@ -32,7 +32,8 @@ use tracktwin_files::{FileName, Kind, Names, Output, inside};
 
 /// Value of the field `format` in `models.json`.
 pub const FORMAT: &str = "tracktwin-models/1";
-const INDEX: &str = "models.json";
+/// File of a folder of models that names the others.
+pub const INDEX: &str = "models.json";
 
 /// All models of a library.
 pub struct Trained {

@@ -48,17 +48,17 @@ fn known_rate(fault: Fault, declared: f64) -> Fault {
     }
 }
 
-/// One error for each pass that is a copy of an earlier one.
+/// Index of each pass that is a copy of an earlier one, and the error that says so.
 pub(super) fn copies<'a>(
     passes: impl Iterator<Item = (&'a Path, &'a [f64])>,
-) -> Vec<RecordingError> {
+) -> Vec<(usize, RecordingError)> {
     let passes: Vec<(&Path, &[f64])> = passes.collect();
     let earlier = |index: usize| {
         let (path, samples) = passes[index];
         passes[..index].iter().find_map(|(other, earlier)| {
             let factor = copies::factor(earlier, samples)?;
             let fault = Fault::Copy { of: file_name(other), factor };
-            Some(RecordingError::new(path, "acceleration", fault))
+            Some((index, RecordingError::new(path, "acceleration", fault)))
         })
     };
     (0..passes.len()).filter_map(earlier).collect()

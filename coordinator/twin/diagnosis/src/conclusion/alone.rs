@@ -6,9 +6,8 @@ use super::{MODEL_MAX, ONE_PASS_MAX, UNPREDICTED_MAX, verdict};
 use crate::outcome::{Diagnosis, FORMAT, FitScores, Hypothesis, Levels, Location, Score, Scores};
 use crate::prepared_recording::PreparationError;
 use std::collections::BTreeMap;
-use tracktwin_inspection::Inspection;
 use tracktwin_inspection::wheel::{Comb, CombBlock};
-use tracktwin_inspection::{Finding, Place};
+use tracktwin_inspection::{Finding, Inspection, Place, separate_wavelengths};
 use tracktwin_signal::recording::Recording;
 use tracktwin_track::extension::{Kind, WHEEL_OUT_OF_ROUND};
 
@@ -41,8 +40,9 @@ pub fn passes_alone(
     );
     let hypotheses: Vec<Hypothesis> = found.iter().map(|(_, it)| it.clone()).collect();
     let mut notes = vec![format!("No track model was compared with the recording: {reason}.")];
-    if let [speed_km_h] = recording.speeds_km_h()[..] {
-        notes.push(one_speed(speed_km_h));
+    let speeds_km_h = recording.speeds_km_h();
+    if !separate_wavelengths(&speeds_km_h) {
+        notes.extend(speeds_km_h.first().copied().map(one_speed));
     }
     if !recording.gain_known() {
         notes.push("The unit of the signal is unknown: amplitudes are relative.".to_owned());
@@ -85,10 +85,11 @@ fn hypothesis(
 ) -> Option<Hypothesis> {
     let kind = Kind::from_name(finding.physics)?;
     let is_tested = is_comb(finding.physics, inspection);
-    let most = match (is_tested || kind.measuring_chain, recording.speeds_km_h().len()) {
+    let is_separated = separate_wavelengths(&recording.speeds_km_h());
+    let most = match (is_tested || kind.measuring_chain, is_separated) {
         (true, _) => MODEL_MAX,
-        (false, 1) => UNPREDICTED_MAX,
-        (false, _) => ONE_PASS_MAX,
+        (false, false) => UNPREDICTED_MAX,
+        (false, true) => ONE_PASS_MAX,
     };
     let location = match finding.place {
         Place::Everywhere => None,

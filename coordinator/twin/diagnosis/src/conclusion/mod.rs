@@ -21,9 +21,9 @@ use crate::outcome::{Diagnosis, FORMAT, Hypothesis, Location, UNKNOWN, Verdict, 
 use crate::prepared_recording::PreparedRecording;
 use crate::search::SearchOutcome;
 use crate::sentence::sentence;
-use tracktwin_inspection::Inspection;
 use tracktwin_inspection::chain::PassDefect;
 use tracktwin_inspection::wheel::Order;
+use tracktwin_inspection::{Inspection, separate_wavelengths};
 use tracktwin_signal::recording::Recording;
 use tracktwin_track::extension::Kind;
 
@@ -138,7 +138,7 @@ impl Evidence<'_> {
 
     /// Largest probability that the recording permits.
     fn probability_max(&self) -> f64 {
-        if self.speeds() == 1 {
+        if self.is_one_speed() {
             UNPREDICTED_MAX
         } else if self.repeats() {
             MODEL_MAX
@@ -172,8 +172,11 @@ impl Evidence<'_> {
         }
     }
 
-    fn speeds(&self) -> usize {
-        self.prepared.forward.speeds_m_s.len()
+    /// Whether all speeds are so near each other that they tell no more than one.
+    fn is_one_speed(&self) -> bool {
+        let speed_km_h = |passes: &Vec<usize>| self.recording.passes[passes[0]].speed_km_h;
+        let speeds_km_h: Vec<f64> = self.prepared.pass_numbers.iter().map(speed_km_h).collect();
+        !separate_wavelengths(&speeds_km_h)
     }
 
     /// Whether some pass repeats another at its speed.

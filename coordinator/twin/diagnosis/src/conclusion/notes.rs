@@ -3,19 +3,19 @@
 use super::{Evidence, ONE_PASS_MAX, UNPREDICTED_MAX};
 use crate::outcome::{Hypothesis, meet};
 use crate::port_scan::PortPlace;
-use tracktwin_inspection::{Finding, Inspection};
+use tracktwin_inspection::{Finding, Inspection, SPEED_RATIO};
 use tracktwin_number::chance;
 use tracktwin_signal::recording::Recording;
 
 /// Ratio of two speeds that separates effects of structure and geometry well.
-const SPEED_RATIO: f64 = 1.35;
+const GOOD_SPEED_RATIO: f64 = 1.35;
 
 impl Evidence<'_> {
     pub(super) fn notes(&self, hypotheses: &[Hypothesis]) -> Vec<String> {
         let mut notes: Vec<String> =
             self.inspection.pass_defects.iter().map(ToString::to_string).collect();
         notes.extend(self.inspection.notes_on_not_compared(self.recording));
-        if self.speeds() == 1 {
+        if self.is_one_speed() {
             notes.push(one_speed(3.6 * self.prepared.forward.speeds_m_s[0]));
         }
         if !self.repeats() {
@@ -93,11 +93,11 @@ pub(super) fn lost(inspection: &Inspection, recording: &Recording) -> Option<Str
 
 pub(super) fn one_speed(speed_km_h: f64) -> String {
     format!(
-        "One speed only: no test on a held-out speed was possible, which limits the \
-             probability of a hypothesis that needs this test to {:.0} %. Add a pass at {:.0} \
+        "One speed only (speeds whose ratio is below {SPEED_RATIO} count as one): no test on a held-out speed was possible, \
+             which limits the probability of a hypothesis that needs this test to {:.0} %. Add a pass at {:.0} \
              km/h or at {:.0} km/h.",
         100.0 * UNPREDICTED_MAX,
-        speed_km_h / SPEED_RATIO,
-        speed_km_h * SPEED_RATIO,
+        speed_km_h / GOOD_SPEED_RATIO,
+        speed_km_h * GOOD_SPEED_RATIO,
     )
 }

@@ -1,6 +1,6 @@
 //! Selection of the compared sleepers, and their division into sections.
 
-use super::MARGIN_SPANS;
+use super::{MARGIN_SPANS, PreparationError, SLEEPERS_MIN};
 use std::ops::Range;
 use tracktwin_signal::recording::Recording;
 
@@ -24,6 +24,28 @@ pub(super) fn covered(recording: &Recording, except: &[usize]) -> Range<usize> {
         }
     }
     longest
+}
+
+/// Checks that some pass covers enough sleepers, before it is known which passes are compared. A recording without
+/// sleeper positions passes the check.
+///
+/// # Errors
+/// [`PreparationError::TooShort`].
+pub fn check_length(recording: &Recording) -> Result<(), PreparationError> {
+    let passes = 0..recording.passes.len();
+    let is_long = |pass: usize| {
+        let others: Vec<usize> = passes.clone().filter(|&other| other != pass).collect();
+        covered(recording, &others).len() >= SLEEPERS_MIN
+    };
+    if recording.sleepers.is_empty() || passes.clone().any(is_long) {
+        return Ok(());
+    }
+    Err(too_short(recording, covered(recording, &[]).len()))
+}
+
+/// Error of a recording whose compared passes share this number of sleepers.
+pub(super) fn too_short(recording: &Recording, sleepers: usize) -> PreparationError {
+    PreparationError::TooShort { sleepers, margin_m: MARGIN_SPANS * recording.spacing_m }
 }
 
 /// Ranges of at most `length` that cover a range; each shares at least `overlap` with the next.

@@ -37,7 +37,7 @@ impl<'a> Energy<'a> {
 
 /// Smallest ratio of two speeds that separates a line of constant wavelength from a line of constant
 /// frequency by more than the width of a resonance of track or vehicle.
-const SPEED_RATIO: f64 = 1.2;
+pub const SPEED_RATIO: f64 = 1.2;
 
 /// Mean speed of a pass in m/s, from its positions.
 pub(crate) fn speed_m_s(pass: &Pass) -> f64 {
@@ -63,9 +63,10 @@ pub(crate) fn by_speed(passes: &[Pass]) -> Vec<Vec<usize>> {
     groups
 }
 
-/// Whether the ratio of the highest to the lowest speed separates effects of constant wavelength
+/// Whether the ratio of the highest to the lowest of these speeds separates effects of constant wavelength
 /// (surface, wheel) from effects of constant frequency (track, vehicle).
-pub fn separates_wavelengths(passes: &[Pass]) -> bool {
-    let speeds = || passes.iter().map(|pass| pass.speed_km_h);
-    speeds().fold(0.0, f64::max) >= SPEED_RATIO * speeds().fold(f64::MAX, f64::min)
+pub fn separate_wavelengths(speeds: &[f64]) -> bool {
+    let [lowest, highest] =
+        speeds.iter().fold([f64::MAX, 0.0], |[low, high], &it| [it.min(low), it.max(high)]);
+    highest >= SPEED_RATIO * lowest
 }

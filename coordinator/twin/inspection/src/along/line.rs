@@ -11,7 +11,7 @@ use tracktwin_signal::recording::Pass;
 const PADDING: usize = 2;
 
 /// Resolution cells on either side of a line that belong to the line (Hann's main lobe).
-const LOBE: f64 = 2.5;
+pub(crate) const LOBE: f64 = 2.5;
 
 /// Default distance of the farthest neighbours of a line on either side, in resolution cells.
 const REACH: f64 = 18.0;

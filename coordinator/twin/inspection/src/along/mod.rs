@@ -13,10 +13,10 @@ pub(crate) mod testing;
 
 pub use background::median;
 pub(crate) use background::{Background, hann, whitened};
-pub use energy::separates_wavelengths;
 pub(crate) use energy::{Energy, by_speed, speed_m_s};
+pub use energy::{SPEED_RATIO, separate_wavelengths};
 pub(crate) use innovation::Innovations;
-pub(crate) use line::{Line, Ruler, Spectrum, amplitude, index_at, on_even_places};
+pub(crate) use line::{LOBE, Line, Ruler, Spectrum, amplitude, index_at, on_even_places};
 pub(crate) use surface::Surface;
 pub(crate) use tail::{
     bonferroni, combine_dependent_p_values, ln_binomial_tail, ln_gamma_tail, ln_normal_bound,

@@ -2,7 +2,7 @@
 
 use crate::along::{
     Background, Line, Ruler, Spectrum, Surface, amplitude, bonferroni, by_speed,
-    combine_dependent_p_values, median, on_even_places, separates_wavelengths, speed_m_s, whitened,
+    combine_dependent_p_values, median, on_even_places, separate_wavelengths, speed_m_s, whitened,
 };
 use rustfft::num_complex::Complex64;
 use tracktwin_signal::recording::{Pass, Recording};
@@ -58,14 +58,14 @@ struct Candidate {
 
 /// Detects corrugation with a false-alarm rate of `alpha`, and returns the most significant one.
 ///
-/// `None` if the speeds are too similar ([`separates_wavelengths`]), because a resonance then looks like a
+/// `None` if the speeds are too similar ([`separate_wavelengths`]), because a resonance then looks like a
 /// wave. `orders_m` is the circumference in m of a wheel whose orders do not count as corrugation.
 pub fn corrugation(
     recording: &Recording,
     alpha: f64,
     orders_m: Option<f64>,
 ) -> Option<Corrugation> {
-    if !separates_wavelengths(&recording.passes) {
+    if !separate_wavelengths(&recording.speeds_km_h()) {
         return None;
     }
     let [shortest, longest] = WAVELENGTHS.map(|share| share * recording.spacing_m);

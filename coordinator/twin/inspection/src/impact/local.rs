@@ -3,7 +3,7 @@
 use super::kink::{Kink, kinks};
 use super::repeated::{Cells, ImpactKind, cells};
 use super::shape::{Form, Observed, Shape, fit};
-use crate::along::{bonferroni, combine_dependent_p_values, separates_wavelengths};
+use crate::along::{bonferroni, combine_dependent_p_values, separate_wavelengths};
 use tracktwin_signal::recording::Recording;
 
 /// An impact is present at a speed if the probability of its power by chance is below this.
@@ -42,7 +42,7 @@ pub fn impacts(recording: &Recording, alpha: f64, except: &[[f64; 2]]) -> Vec<Im
     let allowed = |x: f64| !except.iter().any(|[from, to]| (*from..=*to).contains(&x));
     // At one speed, the band of long hollows is that of the track's resonances as well.
     let is_usable =
-        |kind| kind != ImpactKind::LongHollows || separates_wavelengths(&recording.passes);
+        |kind| kind != ImpactKind::LongHollows || separate_wavelengths(&recording.speeds_km_h());
     let kinds = ImpactKind::ALL.into_iter().filter(|kind| is_usable(*kind));
     let by_kind: Vec<Vec<Cells>> = kinds.map(|kind| cells(recording, kind, false)).collect();
     let tries: usize = by_kind.iter().filter_map(|cells| Some(cells.first()?.ratio.len())).sum();

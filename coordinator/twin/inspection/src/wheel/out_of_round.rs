@@ -6,7 +6,7 @@
 
 use crate::along::{
     Line, Ruler, Spectrum, Surface, amplitude, bonferroni, by_speed, combine_dependent_p_values,
-    on_even_places, separates_wavelengths, speed_m_s,
+    on_even_places, separate_wavelengths, speed_m_s,
 };
 use rustfft::num_complex::Complex64;
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -99,14 +99,14 @@ impl AtSpeed {
 
 /// Detects orders of an out-of-round wheel, with a false-alarm rate of `alpha`, in ascending order.
 ///
-/// Empty if the speeds are too similar ([`separates_wavelengths`]), because a resonance then looks like an
+/// Empty if the speeds are too similar ([`separate_wavelengths`]), because a resonance then looks like an
 /// order.
 pub fn out_of_round(recording: &Recording, circumference_m: f64, alpha: f64) -> Vec<Order> {
     let passes = &recording.passes;
     let from = passes.iter().map(|pass| pass.position_m[0]).fold(f64::MIN, f64::max);
     let ends = passes.iter().map(|pass| pass.position_m[pass.position_m.len() - 1]);
     let to = ends.fold(f64::MAX, f64::min);
-    if !separates_wavelengths(passes) || to - from < TURNS_MIN * circumference_m {
+    if !separate_wavelengths(&recording.speeds_km_h()) || to - from < TURNS_MIN * circumference_m {
         return Vec::new();
     }
     let search = OrderSearch { recording, circumference_m, stretch_m: [from, to] };

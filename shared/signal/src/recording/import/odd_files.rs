@@ -224,13 +224,18 @@ fn copies_do_not_count_as_repeats() {
         let text = import(&[copy.clone(), path], &layout()).unwrap_err().to_string();
         assert!(text.contains(said), "{text}");
     }
-    // In a folder it is said and not refused: simulated passes without noise repeat to the bit.
-    let out = folder.path().join("recording");
+    // In a folder it is left out and not refused: simulated passes without noise repeat to the bit.
+    let [once, twice] = ["once", "twice"].map(|name| folder.path().join(name));
     let mut recording = one(&copy, &layout()).unwrap().recording;
-    recording.passes.push(recording.passes[0].clone());
-    recording.write(&out).unwrap();
-    let doubts = Recording::open(&out).unwrap().doubts;
-    assert!(doubts.len() == 1 && doubts[0].contains("is a copy of pass-"), "{doubts:?}");
+    recording.write(&once).unwrap();
+    recording.passes.extend([recording.passes[0].clone(), recording.passes[0].clone()]);
+    recording.write(&twice).unwrap();
+    let [once, twice] = [once, twice].map(|path| Recording::open(path).unwrap());
+    assert_eq!(format!("{:?}", twice.passes), format!("{:?}", once.passes));
+    let doubts = twice.doubts;
+    let is_said =
+        |doubt: &String| doubt.starts_with("left out: ") && doubt.contains("is a copy of pass-");
+    assert!(doubts.len() == 2 && doubts.iter().all(is_said), "{doubts:?}");
 }
 
 #[test]

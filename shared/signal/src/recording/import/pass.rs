@@ -107,7 +107,7 @@ fn alike(raw: &[Raw]) -> Result<(), RecordingError> {
         }
     }
     let samples = raw.iter().map(|raw| (raw.path.as_path(), raw.samples.as_slice()));
-    check::copies(samples).into_iter().next().map_or(Ok(()), Err)
+    check::copies(samples).into_iter().next().map_or(Ok(()), |(_, copy)| Err(copy))
 }
 
 /// Whether all files run towards smaller positions.
