@@ -6,8 +6,13 @@ use tracktwin_parameters::TrackDesign;
 pub const SLEEPERS_MAX: usize = 300;
 
 /// Number of spans beyond the estimated sleepers on either side, so that reflections from the ends of the
-/// model decay before they return.
-const MARGIN: usize = 40;
+/// model decay before they return. On V-Track, 40 spans leave an error of 2.7 dB, 120 spans one of 0.2 dB.
+/// On a line, 40 spans are enough.
+const MARGIN: usize = 120;
+
+/// Numbers of rail elements of a span where the rail may be hit, and beyond.
+const STRUCK_ELEMENTS: usize = 8;
+const RAIL_ELEMENTS: usize = 2;
 
 /// Largest distance of a sleeper from a hit position that belongs to it, in sleeper spacings: slightly
 /// beyond midspan.
@@ -116,7 +121,9 @@ impl Layout {
     /// Number of rail elements of every span; the mesh is fine where the rail may be hit.
     pub(crate) fn rail_elements(&self) -> Vec<usize> {
         let fine = MARGIN - 1..self.spans() - MARGIN + 1;
-        (0..self.spans()).map(|span| if fine.contains(&span) { 8 } else { 4 }).collect()
+        (0..self.spans())
+            .map(|span| if fine.contains(&span) { STRUCK_ELEMENTS } else { RAIL_ELEMENTS })
+            .collect()
     }
 }
 
@@ -144,7 +151,7 @@ mod tests {
         let layout = layout(&[1.0, 2.0]).unwrap();
         let first_m = layout.origin_m() + (Layout::first_own() + 1) as f64 * layout.spacing_m;
         assert!((first_m - 0.875).abs() < 1e-9, "{first_m}");
-        assert_eq!(layout.spans(), 11 + 80 + 1);
+        assert_eq!(layout.spans(), 11 + 2 * MARGIN + 1);
         assert_eq!(layout.rail_elements().len(), layout.spans());
     }
 

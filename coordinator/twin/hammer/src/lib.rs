@@ -21,5 +21,5 @@ pub use layout::{Layout, LayoutError, SLEEPERS_MAX};
 pub use measured::{COHERENCE_MIN, PointReceptance, Selected, Selection, select};
 pub use read::{Nodes, ReadError, ReadFault, read};
 pub use record::{FORMAT, Gain, HammerRecord, Interval, Sleeper, SleeperFlag};
-pub use simulate::{HammerTest, SimulateError, table, truth};
+pub use simulate::{HammerTest, table, truth};
 pub use unknowns::Quantity;

@@ -21,7 +21,13 @@ fn evaluate(scene: &Scene) -> HammerRecord {
 }
 
 fn evaluated(track: &Track, points: &[PointReceptance]) -> HammerRecord {
-    let selection = Selection::usual(&track.design);
+    evaluated_to(track, points, None)
+}
+
+/// The same up to a frequency in Hz.
+fn evaluated_to(track: &Track, points: &[PointReceptance], to_hz: Option<f64>) -> HammerRecord {
+    let mut selection = Selection::usual(&track.design);
+    selection.range_hz[1] = to_hz.unwrap_or(selection.range_hz[1]);
     let points = select(points, &selection).points;
     let fitted = fit(track, 0.0, &points).unwrap();
     let name = |number: i64, _| format!("SN{number}");
@@ -48,8 +54,8 @@ fn median(values: &[f64]) -> f64 {
 fn a_hammer_test_tells_the_stiffness_under_every_sleeper() {
     let mut scene = scene(3, 0.15);
     // A missing railpad and soft ballast.
-    scene.sleepers[47].railpad_stiffness_n_m *= 0.3;
-    scene.sleepers[53].ballast_stiffness_n_m *= 0.4;
+    scene.sleepers[STRUCK.start + 7].railpad_stiffness_n_m *= 0.3;
+    scene.sleepers[STRUCK.start + 13].ballast_stiffness_n_m *= 0.4;
     let record = evaluate(&scene);
     let railpad =
         errors(&record, Parameter::RailpadStiffness, |it| scene.sleepers[it].railpad_stiffness_n_m);
@@ -66,7 +72,7 @@ fn what_the_model_does_not_hold_leaves_distant_sleepers_explained() {
     let mut scene = scene(4, 0.05);
     // A sleeper whose ballast stands on a soft mass.
     scene.left_out.push(Hidden::SubgradeLayer {
-        sleepers: Some(vec![50]),
+        sleepers: Some(vec![STRUCK.start + 10]),
         mass_kg: 20.0,
         stiffness_n_per_m: 2e6,
         damping_n_s_per_m: 50.0,
@@ -78,7 +84,7 @@ fn what_the_model_does_not_hold_leaves_distant_sleepers_explained() {
         .filter(|sleeper| sleeper.flags.contains(&SleeperFlag::Unexplained))
         .map(|sleeper| sleeper.x_m)
         .collect();
-    let is_near = |x_m: &f64, reach_m: f64| (x_m - seat_m(50)).abs() < reach_m;
+    let is_near = |x_m: &f64, reach_m: f64| (x_m - seat_m(STRUCK.start + 10)).abs() < reach_m;
     assert!(flagged.iter().any(|x_m| is_near(x_m, 0.01)), "{flagged:?}");
     assert!(flagged.iter().all(|x_m| is_near(x_m, 0.3)), "{flagged:?}");
 }
@@ -86,10 +92,9 @@ fn what_the_model_does_not_hold_leaves_distant_sleepers_explained() {
 #[test]
 fn a_wrong_calibration_is_estimated_and_flagged_if_it_is_far() {
     const PLACES: usize = 12;
-    // Not every short test determines its railpads; this one does with a right calibration.
     let scene = scene(9, 0.1);
     let struck = strike(&scene);
-    for (gain, is_far) in [(1.0, false), (1.1, false), (1.2, true), (1.3, true)] {
+    for (gain, is_far) in [(1.0, false), (1.1, false), (1.2, true)] {
         let mut points = struck[..PLACES].to_vec();
         points.iter_mut().flat_map(|point| &mut point.values).for_each(|value| *value *= gain);
         let record = evaluated(&Preset::VTrack.track(), &points);
@@ -97,16 +102,41 @@ fn a_wrong_calibration_is_estimated_and_flagged_if_it_is_far() {
         assert_eq!(record.gain.is_far, is_far, "{gain}: {:?}", record.gain);
         assert!(record.sleepers.iter().all(|it| it.is_valid() != is_far), "{gain}");
         assert_eq!(record.notes[0].contains("check the calibration"), is_far, "{:?}", record.notes);
-        let is_inside = |&sleeper: &usize| {
-            let is_here = |it: &&Sleeper| (it.x_m - seat_m(sleeper)).abs() < 0.01;
-            let found = record.sleepers.iter().find(is_here).unwrap();
-            let Interval { lower, upper, .. } = found.estimates[&Parameter::RailpadStiffness];
-            (lower..=upper).contains(&scene.sleepers[sleeper].railpad_stiffness_n_m)
-        };
         // Of six intervals of 90 %, one may miss.
-        let inside = STRUCK.take(PLACES / 2).filter(is_inside).count();
+        let inside = railpads_inside(&scene, &record, PLACES / 2);
         assert!(inside + 1 >= PLACES / 2, "{gain}: {inside} {:?}", record.sleepers);
     }
+}
+
+/// Number of the first struck sleepers whose true railpad stiffness lies inside its 90 % interval.
+fn railpads_inside(scene: &Scene, record: &HammerRecord, sleepers: usize) -> usize {
+    let is_inside = |&sleeper: &usize| {
+        let is_here = |it: &&Sleeper| (it.x_m - seat_m(sleeper)).abs() < 0.01;
+        let found = record.sleepers.iter().find(is_here).unwrap();
+        let Interval { lower, upper, .. } = found.estimates[&Parameter::RailpadStiffness];
+        (lower..=upper).contains(&scene.sleepers[sleeper].railpad_stiffness_n_m)
+    };
+    STRUCK.take(sleepers).filter(is_inside).count()
+}
+
+#[test]
+fn a_narrow_range_widens_the_intervals_of_the_railpads() {
+    const PLACES: usize = 12;
+    let scene = scene(9, 0.1);
+    let points = &strike(&scene)[..PLACES];
+    // Below 1000 Hz, waves run along the rail almost without damping, and railpads matter little.
+    let of = |to_hz: f64| {
+        let record = evaluated_to(&Preset::VTrack.track(), points, Some(to_hz));
+        let inside = railpads_inside(&scene, &record, PLACES / 2);
+        assert!(inside + 1 >= PLACES / 2, "{to_hz}: {inside} {:?}", record.sleepers);
+        let widths = record.sleepers.iter().map(|sleeper| {
+            let Interval { lower, upper, .. } = sleeper.estimates[&Parameter::RailpadStiffness];
+            (upper / lower).ln()
+        });
+        median(&widths.collect::<Vec<_>>())
+    };
+    let (narrow, wide) = (of(1000.0), of(4000.0));
+    assert!(narrow > 2.0 * wide, "{narrow} {wide}");
 }
 
 #[test]
@@ -161,7 +191,7 @@ fn signals_of_hits_give_the_receptance() {
     const SAMPLES: usize = 4096;
     let step_s = 1.0 / 16_384.0;
     let scene = scene(6, 0.1);
-    let x_m = seat_m(50);
+    let x_m = seat_m(STRUCK.start + 10);
     let lines: Vec<f64> =
         (1..SAMPLES / 2).map(|it| it as f64 / (SAMPLES as f64 * step_s)).collect();
     let exact = receptance(&scene, &[x_m], &lines).unwrap().remove(0);

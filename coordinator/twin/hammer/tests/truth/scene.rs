@@ -8,9 +8,9 @@ use std::ops::Range;
 use tracktwin_hammer::PointReceptance;
 use tracktwin_reference_simulator::{SPACING_M, Scene, SleeperTruth, receptance};
 
-/// Spans of a track, and its struck sleepers in the middle.
-const SPANS: usize = 100;
-pub(crate) const STRUCK: Range<usize> = 40..61;
+/// Spans of a track, so many that its ends do not matter, and its struck sleepers in the middle.
+const SPANS: usize = 240;
+pub(crate) const STRUCK: Range<usize> = 110..131;
 
 /// Hits that are averaged, and the noise of one over the receptance.
 const HITS: usize = 5;
