@@ -65,12 +65,15 @@ pub(crate) fn section(inversion: &Inversion, models: &Evaluation) -> Markup {
     }
 }
 
-/// Banner on the sleepers whose estimates are not valid, and the other notes below it.
+/// Banner on the sleepers whose estimates are not valid and on an unusual value, and the other notes below it.
 fn banner(inversion: &Inversion) -> Markup {
-    let alert = inversion.unexplained_sentence();
+    let alerts = [inversion.unexplained_sentence(), inversion.unusual_sentence()];
+    let alerts: Vec<String> = alerts.into_iter().flatten().collect();
     html! {
-        @if let Some(alert) = &alert { div.banner role="alert" { p { (alert) } } }
-        @for note in inversion.notes.iter().filter(|note| Some(*note) != alert.as_ref()) { p { (note) } }
+        @if !alerts.is_empty() {
+            div.banner role="alert" { @for alert in &alerts { p { (alert) } } }
+        }
+        @for note in inversion.notes.iter().filter(|note| !alerts.contains(note)) { p { (note) } }
     }
 }
 

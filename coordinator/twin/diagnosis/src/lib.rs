@@ -68,5 +68,6 @@ pub use signature::signature;
 pub use spectra::{Spectra, SpeedSpectra, are_one_speed};
 pub use variation::{
     Amplitude, BALLAST_ERROR, Exception, FoundSupportChange, Quadratic, SupportChange,
-    SupportChangeKind, Variation, joined_support_changes, learn_railpad_damping, learn_variation,
+    SupportChangeKind, Variation, expect_variation, joined_support_changes, learn_railpad_damping,
+    learn_variation,
 };

@@ -27,8 +27,9 @@ const LOWEST_PERIODS: f64 = 80.0 * 0.125 * 3.6 / 13.0;
 /// Highest band in Hz if the sample rate permits; the irregularity is negligible above it.
 const HIGHEST_HZ: f64 = 5100.0;
 
-/// Highest band as a share of the sample rate.
-const SAMPLE_RATE_SHARE: f64 = 0.35;
+/// Highest band as a share of the sample rate. Filters begin to act at 0.4 of it, 2.8 standard deviations of
+/// the band's power above.
+const SAMPLE_RATE_SHARE: f64 = 0.3;
 
 /// Highest frequency in Hz that is compared in a recording of this sample rate in Hz.
 pub fn highest_compared_hz(sample_rate_hz: f64) -> f64 {

@@ -24,6 +24,14 @@ const SHARE_MIN: f64 = 0.98;
 /// Share of the spectrum up to half the sample rate from which the sensor noise is estimated.
 const NOISE_BAND: Range<f64> = 0.6..0.9;
 
+/// Lowest frequency times the sleeper spacing, in Hz m, at which the sensor noise is estimated: 5.1 kHz on
+/// V-Track. Below it, the spectrum of the acceleration may be as flat as that of noise.
+const NOISE_FROM: f64 = 5100.0 * 0.125;
+
+/// Smallest ratio by which the spectral density of the acceleration falls over an octave above this
+/// frequency: the square of the frequency.
+const OCTAVE_FALL: f64 = 4.0;
+
 /// The log powers of a recording, by speed, sleeper and band.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spectra {
@@ -41,8 +49,8 @@ pub struct SpeedSpectra {
     /// Natural logarithm of the mean power in m2/s4, `[pass][sleeper][band]`; `None` if the pass does not
     /// cover the sleeper's window.
     pub log_power: Vec<Vec<Option<Vec<f64>>>>,
-    /// One-sided power spectral density of the sensor noise in m2/s3; an upper bound, estimated at the
-    /// highest frequencies.
+    /// One-sided power spectral density of the sensor noise in m2/s3, estimated at the highest frequencies;
+    /// 0 if the sample rate is so low that they contain the acceleration of the axle box.
     pub noise_density: f64,
 }
 
@@ -57,7 +65,7 @@ impl Spectra {
         let mut speeds: Vec<SpeedSpectra> = Vec::new();
         for (pass, log_power) in powers {
             let speed_km_h = recording.passes[pass].speed_km_h;
-            let noise_density = noise_density(&recording.passes[pass].signal);
+            let noise_density = noise_density(&recording.passes[pass].signal, recording.spacing_m);
             let known = speeds.iter_mut().find(|known| are_one_speed(speed_km_h, known.speed_km_h));
             match known {
                 Some(known) => {
@@ -178,6 +186,17 @@ impl Transform {
         Self { sample_rate_hz: signal.sample_rate_hz(), samples, spectrum }
     }
 
+    /// Mean square of the spectrum over a share of the frequencies up to half the sample rate, without
+    /// single lines.
+    fn mean_square(&self, share: Range<f64>) -> f64 {
+        let count = self.spectrum.len() as f64;
+        let lines = (share.start * count) as usize..(share.end * count) as usize;
+        let mut squares: Vec<f64> = self.spectrum[lines].iter().map(Complex64::norm_sqr).collect();
+        let middle = squares.len() / 2;
+        // The median of an exponential distribution is ln 2 of its mean.
+        *squares.select_nth_unstable_by(middle, f64::total_cmp).1 / std::f64::consts::LN_2
+    }
+
     fn power(&self, centre_hz: f64) -> Power {
         let line_hz = self.sample_rate_hz / self.samples as f64;
         let wanted = INSTANTS_PER_PERIOD * centre_hz / line_hz;
@@ -207,17 +226,20 @@ impl Power {
     }
 }
 
-/// Mean power spectral density in m2/s3 at frequencies at which the sensor noise dominates.
-fn noise_density(signal: &Signal) -> f64 {
+/// Power spectral density of the sensor noise in m2/s3, on a track with this sleeper spacing in m.
+///
+/// The noise is white. What is left of the acceleration in the band of the noise is at most a quarter of
+/// what it is an octave below.
+fn noise_density(signal: &Signal, spacing_m: f64) -> f64 {
+    let Range { start, end } = NOISE_BAND;
+    if start * 0.5 * signal.sample_rate_hz() * spacing_m < NOISE_FROM {
+        return 0.0;
+    }
     let transform = Transform::new(signal);
-    let count = transform.spectrum.len() as f64;
-    let lines = (NOISE_BAND.start * count) as usize..(NOISE_BAND.end * count) as usize;
     let density = 2.0 / (transform.sample_rate_hz * signal.len() as f64);
-    // The median of an exponential distribution is ln 2 of its mean, and ignores single lines.
-    let mut powers: Vec<f64> =
-        transform.spectrum[lines].iter().map(|line| density * line.norm_sqr()).collect();
-    let middle = powers.len() / 2;
-    *powers.select_nth_unstable_by(middle, f64::total_cmp).1 / std::f64::consts::LN_2
+    let [below, high] =
+        [0.5 * start..0.5 * end, start..end].map(|share| density * transform.mean_square(share));
+    ((high - below / OCTAVE_FALL) / (1.0 - OCTAVE_FALL.recip())).max(0.0)
 }
 
 #[cfg(test)]
@@ -252,6 +274,34 @@ mod tests {
             // Eight seconds of the narrowest band, 60 Hz wide, are known to 5 %.
             assert!((power.exp() / (weight * density) - 1.0).abs() < 0.2, "{band}");
         }
-        assert!((noise_density(&signal) / density - 1.0).abs() < 0.02);
+        assert!((noise_density(&signal, 0.125) / density - 1.0).abs() < 0.03);
+    }
+
+    /// What an axle box accelerates in is no noise, however low the sample rate.
+    #[test]
+    fn the_acceleration_of_the_axle_box_is_no_noise() {
+        let mut random = ChaCha8Rng::seed_from_u64(2);
+        let mut uniform = || random.next_u64() as f64 / u64::MAX as f64 - 0.5;
+        // Two poles at 800 Hz: flat below, falling with the fourth power of the frequency above.
+        let rate_hz = 5e4;
+        let pole = (-std::f64::consts::TAU * 800.0 / rate_hz).exp();
+        let (mut first, mut second) = (0.0, 0.0);
+        let samples: Vec<f64> = (0..200_000)
+            .map(|_| {
+                first = pole * first + (1.0 - pole) * uniform();
+                second = pole * second + (1.0 - pole) * first;
+                second
+            })
+            .collect();
+        let density = 1.0 / 12.0 / 25e3;
+        let at = |every: usize| {
+            let samples = samples.iter().step_by(every).copied().collect();
+            let signal = Signal::new(rate_hz / every as f64, samples).unwrap();
+            noise_density(&signal, 0.125) / density
+        };
+        // 50, 5 and 1 kHz.
+        for every in [1, 10, 50] {
+            assert!(at(every) < 1e-4, "{every}: {}", at(every));
+        }
     }
 }

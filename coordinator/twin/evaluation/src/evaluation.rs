@@ -153,8 +153,8 @@ pub enum Flag {
     AtEdgeOfRange,
     /// The sleeper differs from its neighbours by more than the track varies elsewhere.
     UnlikeNeighbours,
-    /// The railpad stiffness is a lower bound, because a stiffer railpad hardly changes the recording.
-    RailpadAtLeast,
+    /// The railpad is probably so stiff that a stiffer one hardly changes the recording.
+    RailpadNotResolved,
     /// The wheel is off the rail in the sleeper's window; the recorded acceleration hardly depends on the
     /// track.
     LossOfContact,
@@ -191,7 +191,7 @@ impl Flag {
             Self::MissingSpeed => "missing speed",
             Self::AtEdgeOfRange => "at edge of range",
             Self::UnlikeNeighbours => "unlike its neighbours",
-            Self::RailpadAtLeast => "railpad: at least",
+            Self::RailpadNotResolved => "railpad: not resolved",
             Self::LossOfContact => "loss of contact",
             Self::OutsideLibrary => "outside library: not valid",
             Self::DomainNotTested => "not tested against the library",
@@ -206,7 +206,7 @@ impl Flag {
             Self::MissingSpeed => "missing_speed",
             Self::AtEdgeOfRange => "at_edge_of_range",
             Self::UnlikeNeighbours => "unlike_neighbours",
-            Self::RailpadAtLeast => "railpad_at_least",
+            Self::RailpadNotResolved => "railpad_not_resolved",
             Self::LossOfContact => "loss_of_contact",
             Self::OutsideLibrary => "outside_library",
             Self::DomainNotTested => "domain_not_tested",

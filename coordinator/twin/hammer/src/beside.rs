@@ -21,8 +21,8 @@ const FORMAT: &str = "tracktwin-evaluation/1";
 
 /// Flags of sleepers that are not compared: the estimates are not valid, or the wheel lost contact.
 const NOT_COMPARED: [&str; 2] = ["outside_library", "loss_of_contact"];
-/// Flag of sleepers whose railpad stiffness is only a lower bound.
-const LOWER_BOUND: &str = "railpad_at_least";
+/// Flag of sleepers whose railpad is too stiff to be resolved.
+const NOT_RESOLVED: &str = "railpad_not_resolved";
 
 /// The estimates of an evaluation, read from `evaluation.json`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -105,11 +105,11 @@ impl Loaded {
 
 impl LoadedSleeper {
     /// Mean and standard deviation of a parameter, in its unit. `None` if the estimates are not valid, if
-    /// the wheel lost contact, or if a railpad stiffness is only a lower bound.
+    /// the wheel lost contact, or if a railpad is too stiff to be resolved.
     pub fn estimate(&self, parameter: Parameter) -> Option<[f64; 2]> {
-        let is_bound = parameter == Parameter::RailpadStiffness;
+        let is_railpad = parameter == Parameter::RailpadStiffness;
         let is_left_out = |flag: &String| {
-            NOT_COMPARED.contains(&flag.as_str()) || (is_bound && flag == LOWER_BOUND)
+            NOT_COMPARED.contains(&flag.as_str()) || (is_railpad && flag == NOT_RESOLVED)
         };
         if self.flags.iter().any(is_left_out) {
             return None;
@@ -231,7 +231,7 @@ mod tests {
         for (flags, railpad, ballast) in [
             ("", true, true),
             (r#""at_edge_of_range""#, true, true),
-            (r#""railpad_at_least""#, false, true),
+            (r#""railpad_not_resolved""#, false, true),
             (r#""loss_of_contact""#, false, false),
             (r#""outside_library""#, false, false),
         ] {

@@ -1,7 +1,7 @@
 //! Combination of fitted sections into one track.
 
 use crate::fit::Fitted;
-use crate::record::{Along, Inversion, Prior, Provenance, Sleeper, log_normal};
+use crate::record::{Along, Inversion, Parts, Prior, Provenance, Sleeper, Unusual, log_normal};
 use std::collections::BTreeMap;
 use tracktwin_diagnosis::{
     Amplitude, Common, FoundSupportChange, Mean, Own, PreparedRecording, Unknowns,
@@ -18,6 +18,9 @@ const MISFIT_MAX: f64 = 2.0;
 /// the recording. For other tracks it is multiplied by the length ratio (docs/inversion.md; paper, Table
 /// D1).
 const RAILPAD_RESOLVED: f64 = 2e8;
+
+/// Distance of a value from its prior, in prior standard deviations, from which it is unusual.
+const UNUSUAL: f64 = 3.0;
 
 /// Largest probability of a support change if all passes have one speed: a change of the surface has a similar effect.
 const ONE_SPEED_MAX: f64 = 0.5;
@@ -45,7 +48,14 @@ impl Inversion {
             ranges.iter().cloned().zip(found.iter().map(|found| &found[..])).collect();
         let ids: Vec<String> = recording.sleepers.iter().map(|place| place.id.clone()).collect();
         let changes = joined_support_changes(&ids, &found);
-        Self::new(recording.name.clone(), provenance(sections), sleepers, unevaluated, changes)
+        let unusual = sections.iter().filter_map(|(prepared, fitted)| fitted.unusual(prepared));
+        let parts = Parts {
+            sleepers,
+            unevaluated,
+            support_changes: changes,
+            unusual: unusual.max_by(|a, b| a.deviations.total_cmp(&b.deviations)),
+        };
+        Self::new(recording.name.clone(), provenance(sections), parts)
     }
 }
 
@@ -67,6 +77,27 @@ fn support_changes(
 }
 
 impl Fitted {
+    /// The gain of a speed or the common value that is farthest from its prior, if that is unusual. It may be so
+    /// where all misfits are small.
+    fn unusual(&self, prepared: &PreparedRecording) -> Option<Unusual> {
+        let Self { unknowns, values, .. } = self;
+        let speeds =
+            prepared.forward.speeds_m_s.iter().zip(unknowns.gains()).map(|(speed, at)| {
+                (format!("the power of the passes at {:.0} km/h", 3.6 * speed), at)
+            });
+        let common =
+            Common::ALL.map(|of| (format!("the {}", common(of).label()), unknowns.common(of)));
+        let (typical, deviations) = (unknowns.typical(), unknowns.prior_deviations());
+        speeds
+            .chain(common)
+            .map(|(quantity, at)| {
+                let log = values[at] - typical[at];
+                Unusual { quantity, ratio: log.exp(), deviations: log.abs() / deviations[at] }
+            })
+            .max_by(|a, b| a.deviations.total_cmp(&b.deviations))
+            .filter(|found| found.deviations > UNUSUAL)
+    }
+
     fn sleeper(&self, index: usize, id: &str, x_m: f64, railpad_resolved: f64) -> Sleeper {
         let estimates: Estimates = places(&self.unknowns, index)
             .map(|(of, at)| (of, log_normal(self.values[at], self.deviations[at])))
@@ -76,8 +107,9 @@ impl Fitted {
         if self.unknowns.exceptions.iter().any(|exception| exception.sleeper == index) {
             flags.push(Flag::UnlikeNeighbours);
         }
-        if estimates[&Parameter::RailpadStiffness].mean > railpad_resolved {
-            flags.push(Flag::RailpadAtLeast);
+        // The median: the mean of a log-normal estimate rises with its uncertainty.
+        if self.values[self.unknowns.at(Own::RailpadStiffness, index)] > railpad_resolved.ln() {
+            flags.push(Flag::RailpadNotResolved);
         }
         if misfit > MISFIT_MAX {
             flags.push(Flag::OutsideLibrary);

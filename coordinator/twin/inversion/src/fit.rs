@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use tracktwin_diagnosis::{
     Amplitude, BALLAST_ERROR, Calibration, CalibrationError, Candidate, Forward, Mean, NullModel,
     Observation, Own, PreparationError, PreparedRecording, Problem, Quadratic, Unknowns, Variation,
-    learn_railpad_damping, learn_variation,
+    expect_variation, learn_railpad_damping, learn_variation,
 };
 use tracktwin_parameters::Track;
 use tracktwin_signal::recording::Recording;
@@ -108,6 +108,7 @@ pub fn fit(
             .ok_or(CalibrationError::NotFinite)?;
         learn_railpad_damping(&mut forward.unknowns, &data);
         probabilities = learn_variation(&mut forward.unknowns, &data);
+        expect_variation(&mut forward.unknowns, &data);
         let best = data.best(&forward.unknowns).ok_or(CalibrationError::NotFinite)?;
         let mut start = calibration.values;
         start.rows_mut(0, best.len()).copy_from(&best);

@@ -9,6 +9,9 @@ use tracktwin_parameters::Parameter;
 /// Value of the field `method` in `evaluation.json`.
 pub const METHOD: &str = "inversion";
 
+/// Distance of the 5 % quantile of a normal distribution from its mean, in standard deviations.
+const QUANTILE_5: f64 = 1.645;
+
 /// Parameters that differ from sleeper to sleeper, in the order of the report pages.
 pub const PER_SLEEPER: [Parameter; 3] =
     [Parameter::RailpadStiffness, Parameter::BallastStiffness, Parameter::IrregularityLevel];
@@ -36,6 +39,8 @@ pub struct Inversion {
     pub support_changes: Vec<FoundSupportChange>,
     /// Part of the recording that the track model does not explain.
     pub outside_library: Unexplained,
+    /// The value of the measurement or of all sleepers that is farthest from what was expected.
+    pub unusual: Option<Unusual>,
     /// Notes on the result, one sentence each.
     pub notes: Vec<String>,
 }
@@ -99,6 +104,26 @@ pub struct Sleeper {
     pub flags: Vec<Flag>,
 }
 
+/// A value of the measurement, or one that all sleepers share, that is far from what was expected. The
+/// description of track, vehicle or sensor may be wrong.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Unusual {
+    /// Name of the quantity, with article.
+    pub quantity: String,
+    /// Fitted value divided by the expected one.
+    pub ratio: f64,
+    /// Distance of the logarithms in standard deviations of the prior.
+    pub deviations: f64,
+}
+
+/// Parts of a record that sections give.
+pub(crate) struct Parts {
+    pub(crate) sleepers: Vec<Sleeper>,
+    pub(crate) unevaluated: Vec<Unevaluated>,
+    pub(crate) support_changes: Vec<FoundSupportChange>,
+    pub(crate) unusual: Option<Unusual>,
+}
+
 /// Part of a recording that the track model does not explain. The field names are those of an evaluation by
 /// Gaussian processes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -128,13 +153,8 @@ impl Sleeper {
 
 impl Inversion {
     /// Makes the record from its parts.
-    pub(crate) fn new(
-        recording: String,
-        provenance: Provenance,
-        sleepers: Vec<Sleeper>,
-        unevaluated: Vec<Unevaluated>,
-        support_changes: Vec<FoundSupportChange>,
-    ) -> Self {
+    pub(crate) fn new(recording: String, provenance: Provenance, parts: Parts) -> Self {
+        let Parts { sleepers, unevaluated, support_changes, unusual } = parts;
         let invalid = sleepers.iter().filter(|sleeper| !sleeper.is_valid()).count();
         let share = invalid as f64 / sleepers.len().max(1) as f64;
         let mut inversion = Self {
@@ -146,6 +166,7 @@ impl Inversion {
             unevaluated,
             support_changes,
             outside_library: Unexplained { share, widen: Vec::new() },
+            unusual,
             notes: Vec::new(),
         };
         inversion.notes = inversion.sentences();
@@ -167,8 +188,18 @@ impl Inversion {
         })
     }
 
-    /// Sentences on a single speed, on sleepers that the track model does not explain, on support changes,
-    /// on sleepers that differ from their neighbours, and on those whose railpad stiffness is a lower bound.
+    /// Sentence on a value far from what was expected, as it stands in the notes.
+    pub fn unusual_sentence(&self) -> Option<String> {
+        let Unusual { quantity, ratio, deviations } = self.unusual.as_ref()?;
+        Some(format!(
+            "By the fit, {quantity} is {ratio:.2} times the expected value ({deviations:.1} standard deviations of \
+             what is usual): the description of sensor, vehicle or track may be wrong, and with it all \
+             estimates. Check gain, unsprung mass, rail and sleepers."
+        ))
+    }
+
+    /// Sentences on a single speed, on an unusual value, on sleepers that the track model does not explain, on support changes,
+    /// on sleepers that differ from their neighbours, and on those whose railpad is too stiff to be resolved.
     pub fn sentences(&self) -> Vec<String> {
         let apart = self.with(Flag::UnlikeNeighbours);
         let mut sentences = Vec::new();
@@ -178,6 +209,7 @@ impl Inversion {
                  estimates and support changes may be wrong. Add a pass at another speed."
             ));
         }
+        sentences.extend(self.unusual_sentence());
         sentences.extend(self.unexplained_sentence());
         sentences.extend(self.support_changes.iter().map(FoundSupportChange::sentence));
         if !apart.is_empty() {
@@ -187,14 +219,28 @@ impl Inversion {
                 if apart.len() == 1 { "s" } else { "" }
             ));
         }
-        let stiff = self.with(Flag::RailpadAtLeast);
+        let stiff = self.with(Flag::RailpadNotResolved);
         if !stiff.is_empty() {
             sentences.push(format!(
-                "The railpad stiffness of {} is a lower bound: stiffer railpads hardly change the recording.",
-                listed(&stiff)
+                "The railpad stiffness of {} is not resolved: stiffer railpads hardly change the recording. The true \
+                 values exceed {:.0} MN/m with 95 % probability.",
+                listed(&stiff),
+                1e-6 * self.railpads_exceed()
             ));
         }
         sentences
+    }
+
+    /// Smallest 5 % quantile of the railpad stiffnesses that are not resolved, in N/m.
+    fn railpads_exceed(&self) -> f64 {
+        let flagged =
+            self.sleepers.iter().filter(|it| it.flags.contains(&Flag::RailpadNotResolved));
+        let quantile = |sleeper: &Sleeper| {
+            let Estimate { mean, sd } = sleeper.estimates[&Parameter::RailpadStiffness];
+            let variance = (sd / mean).powi(2).ln_1p();
+            (mean.ln() - 0.5 * variance - QUANTILE_5 * variance.sqrt()).exp()
+        };
+        flagged.map(quantile).fold(f64::INFINITY, f64::min)
     }
 
     fn with(&self, flag: Flag) -> Vec<&str> {
@@ -222,8 +268,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn one_speed_is_a_doubt() {
-        let of = |speeds_km_h: &[f64]| {
+    fn one_speed_and_an_unusual_gain_are_doubts() {
+        let of = |speeds_km_h: &[f64], unusual: Option<Unusual>| {
             let provenance = Provenance {
                 code_version: "1",
                 speeds_km_h: speeds_km_h.to_vec(),
@@ -231,10 +277,19 @@ mod tests {
                 prior: BTreeMap::new(),
                 variation: BTreeMap::new(),
             };
-            Inversion::new("ride".to_owned(), provenance, Vec::new(), Vec::new(), Vec::new()).notes
+            let parts = Parts {
+                sleepers: Vec::new(),
+                unevaluated: Vec::new(),
+                support_changes: Vec::new(),
+                unusual,
+            };
+            Inversion::new("ride".to_owned(), provenance, parts).notes
         };
-        assert_eq!(of(&[10.0, 13.0]), [""; 0]);
-        let doubt = of(&[13.0]);
+        assert_eq!(of(&[10.0, 13.0], None), [""; 0]);
+        let doubt = of(&[13.0], None);
         assert!(doubt[0].starts_with("One speed only (13 km/h): stiffness and"), "{doubt:?}");
+        let quantity = "the power of the passes at 10 km/h".to_owned();
+        let doubt = of(&[10.0, 13.0], Some(Unusual { quantity, ratio: 1.4, deviations: 6.7 }));
+        assert!(doubt[0].contains("at 10 km/h is 1.40 times the expected value"), "{doubt:?}");
     }
 }

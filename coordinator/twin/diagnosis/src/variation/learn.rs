@@ -8,6 +8,9 @@ use crate::quantity::Own;
 /// Factors on a deviation or a length that the search tries.
 const FACTORS: [f64; 4] = [0.5, 0.75, 1.35, 2.0];
 
+/// Factors on the deviations over which the variance is averaged, in equal steps of the logarithm.
+const EXPECTED: [f64; 7] = [0.5, 0.71, 1.0, 1.41, 2.0, 2.83, 4.0];
+
 /// Bounds of deviations (of the logarithm) and of lengths (in sleepers). The error of an odometer alone
 /// makes sleepers differ by 1 to 2 %, and no stiffness of a track varies by more than a factor of three
 /// about its mean.
@@ -142,6 +145,27 @@ fn vary(unknowns: &mut Unknowns, data: &Quadratic) {
     }
 }
 
+/// Multiplies the deviations of each quantity by the root of the mean square of `EXPECTED`, weighted by the evidence.
+///
+/// Few sleepers do not tell how much they differ. The variation with the greatest evidence is then often too small,
+/// and with it the uncertainty of each sleeper. The mean of the variance is what a prediction needs.
+pub fn expect_variation(unknowns: &mut Unknowns, data: &Quadratic) {
+    for field in Own::ALL {
+        let scaled = |factor: f64| {
+            let mut scaled = unknowns.clone();
+            let variation = &mut scaled.variation[field as usize];
+            (0..2).for_each(|which| scale(variation, which, factor));
+            scaled
+        };
+        let evidence = EXPECTED.map(|factor| log_evidence(data, &scaled(factor)));
+        let highest = evidence.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        let weights = evidence.map(|it| (it - highest).exp());
+        let squares = weights.iter().zip(EXPECTED).map(|(weight, factor)| weight * factor * factor);
+        let factor = (squares.sum::<f64>() / weights.iter().sum::<f64>()).sqrt();
+        unknowns.variation = scaled(factor).variation;
+    }
+}
+
 fn scale(variation: &mut Variation, which: usize, factor: f64) {
     let [low, high] = if which == 2 { LENGTH } else { DEVIATION };
     let value = match which {
@@ -247,6 +271,23 @@ mod tests {
             slope[index] = logarithm(sleeper) / 0.05f64.powi(2);
         }
         Quadratic { information, slope, mean: unknowns.typical() }
+    }
+
+    #[test]
+    fn the_less_is_known_the_more_variation_is_expected() {
+        let rise = |information: f64| {
+            let mut unknowns = unknowns();
+            let mut data = measured(&unknowns, 0.1, None);
+            data.information *= information;
+            data.slope *= information;
+            learn_variation(&mut unknowns, &data);
+            let learned = unknowns.variation[0];
+            expect_variation(&mut unknowns, &data);
+            let expected = unknowns.variation[0];
+            expected.smooth.hypot(expected.independent) / learned.smooth.hypot(learned.independent)
+        };
+        let (known, hardly_known) = (rise(1.0), rise(0.01));
+        assert!(known < 1.2 && hardly_known > 1.3, "{known} {hardly_known}");
     }
 
     /// Variation along a track with a Gaussian correlation of `length` sleepers.
