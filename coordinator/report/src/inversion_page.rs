@@ -269,6 +269,7 @@ mod tests {
             unevaluated: Vec::new(),
             support_changes: Vec::new(),
             outside_library: Unexplained::default(),
+            unusual: None,
             notes: Vec::new(),
         };
         inversion.notes = inversion.sentences();

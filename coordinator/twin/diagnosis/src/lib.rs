@@ -66,6 +66,7 @@ pub use search::{Fitted, Round, SearchOutcome, Stage, first_calibration, search}
 pub use section::{Section, owner};
 pub use signature::signature;
 pub use spectra::{Spectra, SpeedSpectra, are_one_speed};
+pub use tracktwin_inspection::separate_wavelengths;
 pub use variation::{
     Amplitude, BALLAST_ERROR, Exception, FoundSupportChange, Quadratic, SupportChange,
     SupportChangeKind, Variation, expect_variation, joined_support_changes, learn_railpad_damping,

@@ -5,7 +5,7 @@ use crate::record::{Along, Inversion, Parts, Prior, Provenance, Sleeper, Unusual
 use std::collections::BTreeMap;
 use tracktwin_diagnosis::{
     Amplitude, Common, FoundSupportChange, Mean, Own, PreparedRecording, Unknowns,
-    joined_support_changes, owner,
+    joined_support_changes, owner, separate_wavelengths,
 };
 use tracktwin_evaluation::{Estimates, Flag, Unevaluated};
 use tracktwin_parameters::Parameter;
@@ -22,7 +22,7 @@ const RAILPAD_RESOLVED: f64 = 2e8;
 /// Distance of a value from its prior, in prior standard deviations, from which it is unusual.
 const UNUSUAL: f64 = 3.0;
 
-/// Largest probability of a support change if all passes have one speed: a change of the surface has a similar effect.
+/// Largest probability of a support change if all passes have nearly one speed: a change of the surface has a similar effect.
 const ONE_SPEED_MAX: f64 = 0.5;
 
 impl Inversion {
@@ -65,7 +65,8 @@ fn support_changes(
     (prepared, fitted): &(PreparedRecording, Fitted),
 ) -> Vec<FoundSupportChange> {
     let id = |sleeper: usize| recording.sleepers[prepared.first_sleeper + sleeper].id.clone();
-    let most = if prepared.forward.speeds_m_s.len() == 1 { ONE_SPEED_MAX } else { 1.0 };
+    let are_apart = separate_wavelengths(&recording.speeds_km_h());
+    let most = if are_apart { 1.0 } else { ONE_SPEED_MAX };
     let limited = |amplitude: Amplitude| Amplitude {
         probability: amplitude.probability.min(most),
         ..amplitude

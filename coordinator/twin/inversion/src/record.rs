@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use std::collections::BTreeMap;
-use tracktwin_diagnosis::{FoundSupportChange, Variation};
+use tracktwin_diagnosis::{FoundSupportChange, Variation, separate_wavelengths};
 use tracktwin_evaluation::{Estimate, Estimates, FORMAT, Flag, Unevaluated};
 use tracktwin_parameters::Parameter;
 
@@ -203,10 +203,14 @@ impl Inversion {
     pub fn sentences(&self) -> Vec<String> {
         let apart = self.with(Flag::UnlikeNeighbours);
         let mut sentences = Vec::new();
-        if let [speed_km_h] = self.provenance.speeds_km_h[..] {
+        let speeds_km_h = &self.provenance.speeds_km_h;
+        if let Some(speed_km_h) = speeds_km_h.first()
+            && !separate_wavelengths(speeds_km_h)
+        {
             sentences.push(format!(
                 "One speed only ({speed_km_h:.0} km/h): stiffness and irregularity have similar effects, so that \
-                 estimates and support changes may be wrong. Add a pass at another speed."
+                 estimates and support changes may be wrong. Speeds whose ratio is below 1.2 count as one. Add a pass at \
+                 another speed."
             ));
         }
         sentences.extend(self.unusual_sentence());
@@ -286,6 +290,7 @@ mod tests {
             Inversion::new("ride".to_owned(), provenance, parts).notes
         };
         assert_eq!(of(&[10.0, 13.0], None), [""; 0]);
+        assert_eq!(of(&[12.6, 13.0], None).len(), 1);
         let doubt = of(&[13.0], None);
         assert!(doubt[0].starts_with("One speed only (13 km/h): stiffness and"), "{doubt:?}");
         let quantity = "the power of the passes at 10 km/h".to_owned();
