@@ -29,7 +29,7 @@ mod tests {
     #[test]
     fn a_coarse_step_is_doubted_with_a_remedy_and_a_fine_one_is_not() {
         let line = doubt(5e-4, 2000.0).unwrap();
-        assert!(line.contains("above 258 Hz") && line.contains("up to 700 Hz"), "{line}");
+        assert!(line.contains("above 258 Hz") && line.contains("up to 600 Hz"), "{line}");
         assert!(line.ends_with("--time-step 1e-5 --sample-rate 2000"), "{line}");
         assert_eq!(doubt(1e-5, 100_000.0), None);
         assert_eq!(doubt(1e-5, 2000.0), None);

@@ -174,9 +174,7 @@ impl Evidence<'_> {
 
     /// Whether all speeds are so near each other that they tell no more than one.
     fn is_one_speed(&self) -> bool {
-        let speed_km_h = |passes: &Vec<usize>| self.recording.passes[passes[0]].speed_km_h;
-        let speeds_km_h: Vec<f64> = self.prepared.pass_numbers.iter().map(speed_km_h).collect();
-        !separate_wavelengths(&speeds_km_h)
+        !separate_wavelengths(&self.prepared.forward.speeds_m_s)
     }
 
     /// Whether some pass repeats another at its speed.

@@ -286,7 +286,7 @@ mod tests {
             let expected = unknowns.variation[0];
             expected.smooth.hypot(expected.independent) / learned.smooth.hypot(learned.independent)
         };
-        let (known, hardly_known) = (rise(1.0), rise(0.01));
+        let (known, hardly_known) = (rise(1.0), rise(1e-4));
         assert!(known < 1.2 && hardly_known > 1.3, "{known} {hardly_known}");
     }
 

@@ -64,9 +64,10 @@ pub(crate) fn by_speed(passes: &[Pass]) -> Vec<Vec<usize>> {
 }
 
 /// Whether the ratio of the highest to the lowest of these speeds separates effects of constant wavelength
-/// (surface, wheel) from effects of constant frequency (track, vehicle).
+/// (surface, wheel) from effects of constant frequency (track, vehicle). True speeds may differ from their nominal
+/// values by a few tenths of a per cent.
 pub fn separate_wavelengths(speeds: &[f64]) -> bool {
     let [lowest, highest] =
         speeds.iter().fold([f64::MAX, 0.0], |[low, high], &it| [it.min(low), it.max(high)]);
-    highest >= SPEED_RATIO * lowest
+    highest >= 0.99 * SPEED_RATIO * lowest
 }
