@@ -1,4 +1,5 @@
-//! Checks whether a campaign continues one in the library or is a new one, and whether this program may continue it.
+//! Checks whether a campaign continues one in the library or is a new one, and whether this program may
+//! continue it.
 
 use super::Stop;
 use crate::pipeline::lack::check_for_training;
@@ -8,7 +9,8 @@ use tracktwin_farm::campaign::{Campaign, Kinship};
 use tracktwin_library::Library;
 
 /// Returns an error if another version of the physics has computed results of the campaign, or if it
-/// would be a new one only because its number of cases changed its sampling sequence; passes other campaigns of the same name, with their differences, to `tell`.
+/// would be a new one only because its number of cases changed its sampling sequence; passes other
+/// campaigns of the same name, with their differences, to `tell`.
 pub(super) async fn check(
     library: &Library,
     campaign: &Campaign,

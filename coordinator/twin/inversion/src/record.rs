@@ -4,13 +4,11 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use tracktwin_diagnosis::{FoundSupportChange, Variation, separate_wavelengths};
 use tracktwin_evaluation::{Estimate, Estimates, FORMAT, Flag, Unevaluated};
+use tracktwin_number::NORMAL_90;
 use tracktwin_parameters::Parameter;
 
 /// Value of the field `method` in `evaluation.json`.
 pub const METHOD: &str = "inversion";
-
-/// Distance of the 5 % quantile of a normal distribution from its mean, in standard deviations.
-const QUANTILE_5: f64 = 1.645;
 
 /// Parameters that differ from sleeper to sleeper, in the order of the report pages.
 pub const PER_SLEEPER: [Parameter; 3] =
@@ -242,7 +240,7 @@ impl Inversion {
         let quantile = |sleeper: &Sleeper| {
             let Estimate { mean, sd } = sleeper.estimates[&Parameter::RailpadStiffness];
             let variance = (sd / mean).powi(2).ln_1p();
-            (mean.ln() - 0.5 * variance - QUANTILE_5 * variance.sqrt()).exp()
+            (mean.ln() - 0.5 * variance - NORMAL_90 * variance.sqrt()).exp()
         };
         flagged.map(quantile).fold(f64::INFINITY, f64::min)
     }

@@ -9,7 +9,7 @@ use crate::quantity::Own;
 const FACTORS: [f64; 4] = [0.5, 0.75, 1.35, 2.0];
 
 /// Factors on the deviations over which the variance is averaged, in equal steps of the logarithm.
-const EXPECTED: [f64; 7] = [0.5, 0.71, 1.0, 1.41, 2.0, 2.83, 4.0];
+const AVERAGED: [f64; 7] = [0.5, 0.71, 1.0, 1.41, 2.0, 2.83, 4.0];
 
 /// Bounds of deviations (of the logarithm) and of lengths (in sleepers). The error of an odometer alone
 /// makes sleepers differ by 1 to 2 %, and no stiffness of a track varies by more than a factor of three
@@ -145,7 +145,7 @@ fn vary(unknowns: &mut Unknowns, data: &Quadratic) {
     }
 }
 
-/// Multiplies the deviations of each quantity by the root of the mean square of `EXPECTED`, weighted by the evidence.
+/// Multiplies the deviations of each quantity by the root of the mean square of [`AVERAGED`], weighted by the evidence.
 ///
 /// Few sleepers do not tell how much they differ. The variation with the greatest evidence is then often too small,
 /// and with it the uncertainty of each sleeper. The mean of the variance is what a prediction needs.
@@ -157,10 +157,10 @@ pub fn expect_variation(unknowns: &mut Unknowns, data: &Quadratic) {
             (0..2).for_each(|which| scale(variation, which, factor));
             scaled
         };
-        let evidence = EXPECTED.map(|factor| log_evidence(data, &scaled(factor)));
+        let evidence = AVERAGED.map(|factor| log_evidence(data, &scaled(factor)));
         let highest = evidence.into_iter().fold(f64::NEG_INFINITY, f64::max);
         let weights = evidence.map(|it| (it - highest).exp());
-        let squares = weights.iter().zip(EXPECTED).map(|(weight, factor)| weight * factor * factor);
+        let squares = weights.iter().zip(AVERAGED).map(|(weight, factor)| weight * factor * factor);
         let factor = (squares.sum::<f64>() / weights.iter().sum::<f64>()).sqrt();
         unknowns.variation = scaled(factor).variation;
     }

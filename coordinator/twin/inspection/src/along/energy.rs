@@ -39,6 +39,10 @@ impl<'a> Energy<'a> {
 /// frequency by more than the width of a resonance of track or vehicle.
 pub const SPEED_RATIO: f64 = 1.2;
 
+/// Share of [`SPEED_RATIO`] that is enough, because true speeds differ from their nominal values by a few tenths of a
+/// per cent.
+const ROUNDING: f64 = 0.99;
+
 /// Mean speed of a pass in m/s, from its positions.
 pub(crate) fn speed_m_s(pass: &Pass) -> f64 {
     let positions = &pass.position_m;
@@ -64,10 +68,9 @@ pub(crate) fn by_speed(passes: &[Pass]) -> Vec<Vec<usize>> {
 }
 
 /// Whether the ratio of the highest to the lowest of these speeds separates effects of constant wavelength
-/// (surface, wheel) from effects of constant frequency (track, vehicle). True speeds may differ from their nominal
-/// values by a few tenths of a per cent.
+/// (surface, wheel) from effects of constant frequency (track, vehicle).
 pub fn separate_wavelengths(speeds: &[f64]) -> bool {
     let [lowest, highest] =
         speeds.iter().fold([f64::MAX, 0.0], |[low, high], &it| [it.min(low), it.max(high)]);
-    highest >= 0.99 * SPEED_RATIO * lowest
+    highest >= ROUNDING * SPEED_RATIO * lowest
 }
