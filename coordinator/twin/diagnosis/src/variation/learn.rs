@@ -145,7 +145,8 @@ fn vary(unknowns: &mut Unknowns, data: &Quadratic) {
     }
 }
 
-/// Multiplies the deviations of each quantity by the root of the mean square of [`AVERAGED`], weighted by the evidence.
+/// Multiplies the deviations of each quantity by the root mean square of seven factors (0.5 to 4), weighted by the
+/// evidence.
 ///
 /// Few sleepers do not tell how much they differ. The variation with the greatest evidence is then often too small,
 /// and with it the uncertainty of each sleeper. The mean of the variance is what a prediction needs.
