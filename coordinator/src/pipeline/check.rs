@@ -1,6 +1,6 @@
 //! Properties of a described track: stiffness, resonances, surface, contact.
 
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use serde::Serialize;
 use std::f64::consts::{PI, SQRT_2, TAU};
 use tracktwin_parameters::{Parameter, ParameterSet, Track, TrackDesign};

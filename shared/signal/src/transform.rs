@@ -5,8 +5,9 @@
 //! faster transform of the features.
 
 use crate::wavelet::Morlet;
-use rustfft::{Fft, FftPlanner, num_complex::Complex64};
+use num_complex::Complex64;
 use std::{f64::consts::TAU, ops::Range, sync::Arc};
+use tracktwin_fourier::Fft;
 
 /// Padding of the signal for the transform, which is circular.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -122,9 +123,8 @@ impl Cwt {
     ) -> Self {
         let (padded, first) = padding.around(samples);
         let length = padded.len();
-        let mut planner = FftPlanner::new();
-        let inverse = planner.plan_fft_inverse(length);
-        let spectrum = positive_spectrum(&padded, &planner.plan_fft_forward(length));
+        let inverse = tracktwin_fourier::inverse(length);
+        let spectrum = positive_spectrum(&padded, &tracktwin_fourier::forward(length));
         let line_hz = sample_rate_hz / length as f64;
 
         let frequencies_hz: Vec<_> = scales_s.iter().map(|&a| wavelet.frequency_hz(a)).collect();

@@ -4,8 +4,7 @@
 //! noise.
 
 use crate::Signal;
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use std::f64::consts::TAU;
 
 /// The signal is shorter than one segment, or the segment has no samples.
@@ -43,7 +42,7 @@ impl PowerSpectrum {
         let window: Vec<f64> = (0..segment)
             .map(|index| 0.5 - 0.5 * (TAU * index as f64 / segment as f64).cos())
             .collect();
-        let transform = FftPlanner::new().plan_fft_forward(segment);
+        let transform = tracktwin_fourier::forward(segment);
         let mut density = vec![0.0; segment / 2 + 1];
         let starts: Vec<_> = (0..=samples.len() - segment).step_by(segment / 2).collect();
         for &start in &starts {

@@ -6,7 +6,7 @@
 
 use crate::estimate::Estimate;
 use nalgebra::{DMatrix, DVector};
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;

@@ -8,7 +8,7 @@
 //! wheels one by one, each as a rigid wheel with the mass and load of the first. Source: T. X. Wu and D. J.
 //! Thompson, Vehicle System Dynamics 34 (2001).
 
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use std::f64::consts::TAU;
 use tracktwin_track::frequency::shares;
 use tracktwin_track::model::TrackModel;

@@ -4,9 +4,10 @@
 //! for the surface. The two spectra are therefore added.
 
 use crate::section::Section;
-use rustfft::{Fft, FftPlanner, num_complex::Complex64};
+use num_complex::Complex64;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
+use tracktwin_fourier::Fft;
 use tracktwin_track::model::ContactPatch;
 
 /// Number of samples per sleeper spacing; the shortest compared wave has more than two samples.
@@ -40,7 +41,7 @@ impl Shape {
     ) -> Option<Self> {
         let spacing_m = section.track.design.sleeper.spacing_m;
         let step_m = spacing_m / SAMPLES_PER_SPACING as f64;
-        let transform = FftPlanner::new().plan_fft_forward(SAMPLES);
+        let transform = tracktwin_fourier::forward(SAMPLES);
         let of = |sleeper: usize| {
             let middle_m = section.model_x_m(section.x_m(sleeper));
             squares(&transform, step_m, spacing_m, |offset_m| height_m(middle_m + offset_m))

@@ -1,9 +1,8 @@
 //! Measured wavelet power in bands, over every sleeper in every pass.
 
 use crate::bands::{Bands, gain};
+use num_complex::Complex64;
 use rayon::prelude::*;
-use realfft::RealFftPlanner;
-use rustfft::{FftPlanner, num_complex::Complex64};
 use std::ops::Range;
 use tracktwin_signal::Signal;
 use tracktwin_signal::recording::Recording;
@@ -180,7 +179,7 @@ impl Transform {
         let samples = signal.len().next_power_of_two();
         let mut padded: Vec<f64> = signal.samples().iter().map(|value| value - mean).collect();
         padded.resize(samples, 0.0);
-        let forward = RealFftPlanner::new().plan_fft_forward(samples);
+        let forward = tracktwin_fourier::real_forward(samples);
         let mut spectrum = forward.make_output_vec();
         forward.process(&mut padded, &mut spectrum).expect("lengths are the plan's own");
         Self { sample_rate_hz: signal.sample_rate_hz(), samples, spectrum }
@@ -208,7 +207,7 @@ impl Transform {
             let weight = 2.0 * gain(centre_hz, line as f64 * line_hz) / self.samples as f64;
             values[line % instants] += weight * self.spectrum[line];
         }
-        FftPlanner::new().plan_fft_inverse(instants).process(&mut values);
+        tracktwin_fourier::inverse(instants).process(&mut values);
         Power {
             values: values.iter().map(Complex64::norm_sqr).collect(),
             step: self.samples as f64 / instants as f64,

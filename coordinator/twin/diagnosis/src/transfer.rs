@@ -3,7 +3,7 @@
 use crate::further_wheels::FurtherWheels;
 use crate::profile::Shape;
 use crate::section::{Section, Window};
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use std::f64::consts::TAU;
 use std::ops::Range;
 use std::sync::Arc;

@@ -5,10 +5,9 @@ use crate::hidden::Hidden;
 use crate::nuisances::Nuisances;
 use crate::scene::Scene;
 use crate::vtrack::WHEEL_RADIUS_M;
+use num_complex::Complex64;
 use rand_chacha::ChaCha12Rng;
 use rand_distr::{Distribution, StandardNormal};
-use realfft::RealFftPlanner;
-use realfft::num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 
 /// Factor `k` and cut-off `Omega_c` in rad/m of eq. B.6, and its level 1 in m2 rad/m.
@@ -67,7 +66,7 @@ impl Irregularity {
             }
         }
         let back = |mut lines: Vec<Complex64>| {
-            let transform = RealFftPlanner::new().plan_fft_inverse(count);
+            let transform = tracktwin_fourier::real_inverse(count);
             let mut values = transform.make_output_vec();
             transform.process(&mut lines, &mut values).expect("lengths and ends are as planned");
             values

@@ -8,8 +8,8 @@ use super::{
     stretch::Stretch,
 };
 use crate::Signal;
+use num_complex::Complex64;
 use parking_lot::Mutex;
-use rustfft::num_complex::Complex64;
 use std::{collections::HashMap, ops::Range, sync::Arc};
 use tracktwin_number::rounded;
 

@@ -2,7 +2,7 @@
 
 use super::{Extractor, FeatureError};
 use crate::Signal;
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use std::ops::Range;
 
 /// Magnitudes over frequency and time, with reduced time resolution for a plot.

@@ -9,9 +9,9 @@
 
 use super::{FeatureDefinition, stretch::Stretch};
 use crate::wavelet::Morlet;
-use realfft::{RealFftPlanner, RealToComplex};
-use rustfft::{Fft, FftPlanner, num_complex::Complex64};
+use num_complex::Complex64;
 use std::{f64::consts::TAU, ops::Range, sync::Arc};
+use tracktwin_fourier::{Fft, RealToComplex};
 
 /// Distance, in standard deviations of the wavelet, up to which voices contribute to a bin. Farther
 /// voices contain less than 0.2 % of a tone.
@@ -102,12 +102,6 @@ struct Octave {
     voices: Vec<Voice>,
 }
 
-/// What makes the Fourier transforms of a plan.
-struct Planners {
-    real: RealFftPlanner<f64>,
-    complex: FftPlanner<f64>,
-}
-
 /// The lines of the spectrum that a voice takes, and their weights: the wavelet, times all
 /// constant factors.
 struct Voice {
@@ -132,13 +126,10 @@ impl Plan {
         sample_rate_hz: f64,
         instants: Instants,
     ) -> Self {
-        let mut planners = Planners { real: RealFftPlanner::new(), complex: FftPlanner::new() };
         let octaves = voices_hz
             .chunk_by(|a, b| halvings(definition, *a) == halvings(definition, *b))
             .flat_map(|alike| alike.chunks(definition.voices_per_octave as usize))
-            .map(|voices_hz| {
-                Octave::new(&mut planners, definition, voices_hz, sample_rate_hz, instants)
-            })
+            .map(|voices_hz| Octave::new(definition, voices_hz, sample_rate_hz, instants))
             .collect();
         Self { octaves }
     }
@@ -174,7 +165,6 @@ fn halvings(definition: &FeatureDefinition, voice_hz: f64) -> u32 {
 
 impl Octave {
     fn new(
-        planners: &mut Planners,
         definition: &FeatureDefinition,
         voices_hz: &[f64],
         sample_rate_hz: f64,
@@ -199,8 +189,8 @@ impl Octave {
             samples,
             instants,
             line_hz,
-            forward: planners.real.plan_fft_forward(samples),
-            inverse: planners.complex.plan_fft_inverse(instants),
+            forward: tracktwin_fourier::real_forward(samples),
+            inverse: tracktwin_fourier::inverse(instants),
             voices,
         }
     }

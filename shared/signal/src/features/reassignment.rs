@@ -1,6 +1,6 @@
 //! Reassignment of a coefficient to the bin nearest to its instantaneous frequency, without logarithms.
 
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 
 /// Bins that are evenly spaced in the logarithm of frequency, as a table over the leading bits of
 /// a floating-point number.

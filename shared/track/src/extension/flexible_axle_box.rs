@@ -103,7 +103,7 @@ impl Extension for FlexibleAxleBox {
 #[cfg(test)]
 mod tests {
     use crate::extension::testing::{instance, track};
-    use rustfft::num_complex::Complex64;
+    use num_complex::Complex64;
     use std::f64::consts::TAU;
 
     const BOX_KG: f64 = 10.0;

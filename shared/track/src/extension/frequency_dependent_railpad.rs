@@ -97,7 +97,7 @@ mod tests {
     use crate::model::Support;
     use tracktwin_parameters::ParameterSet;
 
-    fn relaxing(time_s: f64) -> Vec<rustfft::num_complex::Complex64> {
+    fn relaxing(time_s: f64) -> Vec<num_complex::Complex64> {
         let pads = instance("frequency_dependent_railpad").with("stiffness_ratio", 0.5);
         direct_receptance(
             &track(&[pads.with("relaxation_time_s", time_s)]),

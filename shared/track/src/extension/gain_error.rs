@@ -4,7 +4,7 @@ use super::{
     Class, EffectFamily, Extension, Kind, KindParameter, LookAlikeGroup, Measured, PlaceKind,
     Screening,
 };
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {

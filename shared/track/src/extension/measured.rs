@@ -1,7 +1,7 @@
 //! A pass as the measuring chain records it.
 
+use num_complex::Complex64;
 use rustfft::FftPlannerScalar;
-use rustfft::num_complex::Complex64;
 
 /// Acceleration and position of a pass inside the measuring chain. Each fault of the chain changes them
 /// in turn.

@@ -53,7 +53,7 @@ pub use screening::{Family, Places, Screening, Trials};
 pub use text::InstanceTextError;
 
 use crate::model::{Assembly, Vehicle};
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use std::fmt::Debug;
 
 /// Physics that the model of the paper leaves out, or a fault of the measuring chain.

@@ -71,7 +71,7 @@ mod tests {
     use crate::frequency::{ReceptancePoint, receptance};
     use crate::model::{HertzContact, Surface, TrackModel};
     use crate::time;
-    use rustfft::num_complex::Complex64;
+    use num_complex::Complex64;
     use std::f64::consts::TAU;
 
     #[test]

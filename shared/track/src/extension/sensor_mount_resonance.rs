@@ -4,7 +4,7 @@ use super::{
     Class, EffectFamily, Extension, Family, Kind, KindParameter, LookAlikeGroup, Measured,
     PlaceKind, Places, Screening, Trials,
 };
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {
@@ -71,7 +71,7 @@ impl Extension for SensorMountResonance {
 mod tests {
     use crate::extension::Measured;
     use crate::extension::testing::{extension, instance};
-    use rustfft::num_complex::Complex64;
+    use num_complex::Complex64;
     use std::f64::consts::TAU;
 
     #[test]

@@ -62,7 +62,7 @@ mod tests {
     use crate::frequency::{ReceptancePoint, receptance};
     use crate::model::{Mesh, Support, Surface, TrackModel};
     use crate::time::{self, Pass};
-    use rustfft::num_complex::Complex64;
+    use num_complex::Complex64;
     use tracktwin_parameters::{ParameterSet, TrackDesign};
 
     const SPANS: usize = 12;

@@ -4,7 +4,7 @@ use super::{Extension, ExtensionInstance};
 use crate::frequency::{ReceptancePoint, receptance};
 use crate::model::{Mesh, Support, Surface, TrackModel};
 use crate::time::{self, Pass};
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use std::sync::Arc;
 use tracktwin_parameters::{ParameterSet, TrackDesign};
 

@@ -4,8 +4,8 @@ use super::banded::Inverse;
 use super::lane::{LANES, Lane, omega};
 use super::rail::{Partition, deflections};
 use crate::model::TrackModel;
+use num_complex::Complex64;
 use rayon::prelude::*;
-use rustfft::num_complex::Complex64;
 use std::ops::Range;
 
 /// Receptances in m/N between every rail node and the place `distance_m` ahead of the node (negative:

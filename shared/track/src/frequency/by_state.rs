@@ -10,8 +10,8 @@ use super::states::{Hold, States};
 use super::varied::{CHANGED_MAX, Columns, Difference, resisted};
 use crate::model::TrackModel;
 use nalgebra::DMatrix;
+use num_complex::Complex64;
 use rayon::prelude::*;
-use rustfft::num_complex::Complex64;
 use std::ops::Range;
 use std::sync::Arc;
 

@@ -1,6 +1,6 @@
 //! Eight complex numbers in one vector, one per frequency.
 
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use std::array;
 use std::f64::consts::TAU;
 use std::ops::{Add, Mul, Sub};

@@ -10,8 +10,8 @@ use super::piece::{Piece, pieces};
 use super::receptances::{RailReceptances, SeatReceptances};
 use super::states::States;
 use crate::model::{Matrices, TrackModel};
+use num_complex::Complex64;
 use rayon::prelude::*;
-use rustfft::num_complex::Complex64;
 use std::ops::Range;
 
 /// Partition of the matrices of a track into the rail and the pieces connected to it.

@@ -5,7 +5,7 @@ use faer::MatMut;
 use faer::linalg::solvers::Solve;
 use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use std::f64::consts::TAU;
 
 /// Point where the force acts or the displacement is observed. Both are positive downwards.

@@ -1,7 +1,7 @@
 //! The rail's receptances as values.
 
 use super::by_state::StateReceptances;
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use std::ops::Range;
 use std::sync::Arc;
 

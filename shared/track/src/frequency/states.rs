@@ -3,7 +3,7 @@
 use super::receptances::RailReceptances;
 use crate::model::{ForceLaw, TrackModel};
 use crate::time::StaticSolution;
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use std::ops::Range;
 
 /// Number of bisections between two nodes that locate the position where a law becomes active: to a

@@ -3,10 +3,10 @@
 //! This module implements eq. B.6 and the synthesis of a surface. The module `time` simulates the wheel
 //! on the surface.
 
+use num_complex::Complex64;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rustfft::FftPlannerScalar;
-use rustfft::num_complex::Complex64;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 use tracktwin_parameters::unit;

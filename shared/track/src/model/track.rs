@@ -7,7 +7,7 @@ use super::{
 use crate::element::SpringDamper;
 use crate::extension::{Extension, Measured};
 use crate::time;
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use std::sync::{Arc, OnceLock};
 use tracktwin_parameters::TrackDesign;
 

@@ -1,6 +1,6 @@
 //! The vehicle on the track, and the acceleration that its sensor measures.
 
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use tracktwin_parameters::Wheel;
 
 /// A wheel with the parts that move with it, and further wheels on the same rail.

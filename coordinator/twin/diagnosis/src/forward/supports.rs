@@ -6,8 +6,8 @@
 use super::Forward;
 use crate::section::Window;
 use crate::transfer::Transfer;
+use num_complex::Complex64;
 use rayon::prelude::*;
-use rustfft::num_complex::Complex64;
 use std::ops::Range;
 
 /// Number of varied values of a support.
@@ -148,7 +148,7 @@ mod tests {
     use super::*;
     use crate::bands::Bands;
     use crate::section::Section;
-    use rustfft::num_complex::Complex64;
+    use num_complex::Complex64;
     use tracktwin_parameters::TrackDesign;
 
     #[test]

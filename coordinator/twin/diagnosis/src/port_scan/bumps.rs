@@ -1,6 +1,6 @@
 //! Basis functions of frequency for an unknown dynamic stiffness.
 
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 
 /// Number of basis functions over the logarithm of the frequency.
 pub(super) const BUMPS: usize = 14;

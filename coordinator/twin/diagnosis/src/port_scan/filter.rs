@@ -5,7 +5,7 @@ use super::prior::Prior;
 use crate::behaviour::{Behaviour, PortEvidence};
 use crate::calibration::Calibration;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 
 /// Signature of an unknown dynamic stiffness at one port.
 pub(super) struct Trace {

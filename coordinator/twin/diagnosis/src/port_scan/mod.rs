@@ -18,8 +18,8 @@ use self::place::seats_together;
 use crate::behaviour::Behaviour;
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
 use rayon::prelude::*;
-use rustfft::num_complex::Complex64;
 
 /// Evidence for an unknown dynamic stiffness at one port.
 #[derive(Clone, Debug)]

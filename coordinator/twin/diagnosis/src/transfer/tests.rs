@@ -1,7 +1,6 @@
 //! Expected powers against simulations in time.
 
 use super::*;
-use rustfft::FftPlanner;
 use tracktwin_parameters::{ParameterSet, TrackDesign};
 use tracktwin_track::extension::ExtensionInstance;
 use tracktwin_track::model::{Mesh, Roughness, Support};
@@ -52,7 +51,7 @@ fn band_powers(values: &[f64], time_step_s: f64, centres_hz: &[f64]) -> Vec<f64>
         .enumerate()
         .map(|(index, value)| Complex64::from(value * (1.0 - turn(index).cos())))
         .collect();
-    FftPlanner::new().plan_fft_forward(spectrum.len()).process(&mut spectrum);
+    tracktwin_fourier::forward(spectrum.len()).process(&mut spectrum);
     let hz = |line: usize| line as f64 / (values.len() as f64 * time_step_s);
     let inside = |centre: f64, line: usize| (hz(line) / centre).log2().abs() < 1.0 / 6.0;
     let power = |&centre: &f64| {

@@ -3,7 +3,6 @@
 use super::{ReadError, ReadFault, Rows};
 use crate::PointReceptance;
 use num_complex::Complex64;
-use realfft::RealFftPlanner;
 use std::f64::consts::TAU;
 use tracktwin_parameters::quantity::PLACE;
 
@@ -77,7 +76,7 @@ pub(super) fn read(text: &str) -> Result<Vec<PointReceptance>, ReadError> {
 fn average(hits: &[Hit]) -> Result<PointReceptance, ReadError> {
     let step_s = step(hits)?;
     let samples = hits.iter().map(|hit| hit.force_n.len()).min().unwrap_or_default();
-    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(samples);
+    let transform = tracktwin_fourier::real_forward(samples);
     let spectrum = |signal: &[f64]| {
         let mean = signal[..samples].iter().sum::<f64>() / samples as f64;
         let mut input: Vec<f64> = signal[..samples].iter().map(|value| value - mean).collect();

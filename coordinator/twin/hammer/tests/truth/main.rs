@@ -5,10 +5,10 @@
 mod scene;
 
 use num_complex::Complex64;
-use realfft::RealFftPlanner;
 use scene::{STRUCK, scene, seat_m, strike};
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
+use tracktwin_fourier::{real_forward, real_inverse};
 use tracktwin_hammer::{
     HammerRecord, Interval, Loaded, Nodes, PointReceptance, Selection, Sleeper, SleeperFlag,
     beside, fit, read, select,
@@ -195,8 +195,7 @@ fn signals_of_hits_give_the_receptance() {
     let lines: Vec<f64> =
         (1..SAMPLES / 2).map(|it| it as f64 / (SAMPLES as f64 * step_s)).collect();
     let exact = receptance(&scene, &[x_m], &lines).unwrap().remove(0);
-    let mut planner = RealFftPlanner::<f64>::new();
-    let (forward, inverse) = (planner.plan_fft_forward(SAMPLES), planner.plan_fft_inverse(SAMPLES));
+    let (forward, inverse) = (real_forward(SAMPLES), real_inverse(SAMPLES));
     // A pulse of a steel tip, 0.3 ms long.
     let pulse = |time_s: f64| if time_s < 3e-4 { (PI / 3e-4 * time_s).sin().powi(2) } else { 0.0 };
     let force: Vec<f64> = (0..SAMPLES).map(|it| 500.0 * pulse(it as f64 * step_s)).collect();

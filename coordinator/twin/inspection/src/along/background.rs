@@ -1,7 +1,6 @@
 //! Background of a pass: a power spectral density that impacts do not affect.
 
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 use tracktwin_signal::Signal;
 
@@ -74,7 +73,7 @@ fn powers(samples: &[f64], segment: usize) -> Vec<Vec<f64>> {
     if samples.len() < segment {
         return Vec::new();
     }
-    let transform = FftPlanner::new().plan_fft_forward(segment);
+    let transform = tracktwin_fourier::forward(segment);
     let power = |start: usize| {
         let part = &samples[start..start + segment];
         let mean = part.iter().sum::<f64>() / segment as f64;
@@ -107,7 +106,7 @@ pub(crate) fn whitened(
         let inside = (low_hz..=high_hz).contains(&frequency) && 2 * bin < length;
         *line *= if inside { scale / background.at(frequency).sqrt() } else { 0.0 };
     }
-    FftPlanner::new().plan_fft_inverse(length).process(&mut lines);
+    tracktwin_fourier::inverse(length).process(&mut lines);
     lines.truncate(signal.samples().len());
     lines
 }
@@ -124,7 +123,7 @@ pub(crate) fn faded_lines(signal: &Signal) -> Vec<Complex64> {
             if edge < fade { 0.5 - 0.5 * (PI * edge as f64 / fade as f64).cos() } else { 1.0 };
         line.re = weight * (value - mean);
     }
-    FftPlanner::new().plan_fft_forward(lines.len()).process(&mut lines);
+    tracktwin_fourier::forward(lines.len()).process(&mut lines);
     lines
 }
 

@@ -1,6 +1,6 @@
 //! Power of a whitened pass between any two positions.
 
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use tracktwin_signal::recording::Pass;
 
 /// Cumulative power of a pass along the track.

@@ -2,8 +2,7 @@
 
 use super::background::{faded_lines, median};
 use nalgebra::{DMatrix, DVector};
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use tracktwin_number::NORMAL_QUARTILE;
 use tracktwin_signal::recording::Pass;
 
@@ -76,7 +75,7 @@ fn resampled(pass: &Pass, top_hz: f64) -> (Vec<f64>, Vec<f64>) {
     for line in 1..half {
         low[kept - line] = lines[length - line];
     }
-    FftPlanner::new().plan_fft_inverse(kept).process(&mut low);
+    tracktwin_fourier::inverse(kept).process(&mut low);
     let step = length as f64 / kept as f64;
     let last = pass.position_m.len() - 1;
     let places =

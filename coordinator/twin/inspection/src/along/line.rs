@@ -2,8 +2,7 @@
 
 use super::background::{hann, median};
 use super::tail::ln_line_tail;
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use std::ops::Range;
 use tracktwin_signal::recording::Pass;
 
@@ -131,7 +130,7 @@ impl Spectrum {
         let windowed = values.iter().enumerate().map(|(i, value)| value * hann(i, length));
         let mut lines: Vec<_> = windowed.collect();
         lines.resize(PADDING * length, Complex64::ZERO);
-        FftPlanner::new().plan_fft_forward(lines.len()).process(&mut lines);
+        tracktwin_fourier::forward(lines.len()).process(&mut lines);
         let power = lines[..=length * PADDING / 2].iter().map(Complex64::norm_sqr).collect();
         let step = 1.0 / (step * (PADDING * length) as f64);
         Self { step, power, length, reach: REACH, shape: None }

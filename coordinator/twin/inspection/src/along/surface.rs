@@ -8,7 +8,7 @@
 
 use super::{Background, speed_m_s};
 use nalgebra::{Matrix3, Vector3};
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use std::f64::consts::{LN_2, TAU};
 use tracktwin_parameters::{Parameter, Track};
 use tracktwin_signal::recording::{Pass, Recording};

@@ -6,7 +6,7 @@
 use crate::along::{
     LOBE, Line, Spectrum, bonferroni, by_speed, index_at, ln_gamma_tail, speed_m_s,
 };
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use std::f64::consts::TAU;
 use tracktwin_signal::Signal;
 use tracktwin_signal::recording::{Pass, Recording};

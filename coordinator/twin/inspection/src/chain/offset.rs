@@ -4,7 +4,7 @@ use crate::along::{
     Background, Ruler, bonferroni, by_speed, ln_normal_bound, median, on_even_places, speed_m_s,
     whitened,
 };
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use std::f64::consts::LN_2;
 use tracktwin_signal::recording::{Pass, Recording};
 

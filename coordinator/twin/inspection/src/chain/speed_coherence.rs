@@ -1,8 +1,7 @@
 //! Coherence between the passes at one speed and those at other speeds.
 
 use crate::along::{Background, Ruler, by_speed, hann, on_even_places, speed_m_s, whitened};
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use tracktwin_signal::recording::{Pass, Recording};
 
 /// Compared waves, in waves per sleeper spacing: longer than the error of the odometer, and with high power
@@ -71,7 +70,7 @@ fn segments(recording: &Recording) -> Option<Vec<Segments>> {
 }
 
 fn lines(values: &[Complex64], length: usize) -> Segments {
-    let transform = FftPlanner::new().plan_fft_forward(length);
+    let transform = tracktwin_fourier::forward(length);
     let of_segment = |start: usize| {
         let mut lines: Vec<Complex64> =
             (0..length).map(|i| values[start + i] * hann(i, length)).collect();

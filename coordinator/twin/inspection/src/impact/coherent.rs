@@ -6,8 +6,7 @@
 
 use super::shape::{Fitted, Form, Shape, most_likely};
 use crate::along::{Innovations, Surface};
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 
 /// Shortest and longest length of a dip and of a hollow, in sleeper spacings. Shorter ones stand out by their power.
 const DIP_LENGTHS: [f64; 2] = [0.1, 2.4];
@@ -76,7 +75,7 @@ fn whitening(surface: &Surface, step_m: f64) -> Vec<Complex64> {
     let mut lines: Vec<Complex64> =
         (0..POINTS).map(|line| Complex64::new(ln_gain(line), 0.0)).collect();
     // The cepstrum of a minimum-phase filter is zero before its origin.
-    FftPlanner::new().plan_fft_inverse(POINTS).process(&mut lines);
+    tracktwin_fourier::inverse(POINTS).process(&mut lines);
     for (quefrency, line) in lines.iter_mut().enumerate() {
         let fold = match quefrency {
             0 => 1.0,
@@ -86,7 +85,7 @@ fn whitening(surface: &Surface, step_m: f64) -> Vec<Complex64> {
         };
         *line *= fold / POINTS as f64;
     }
-    FftPlanner::new().plan_fft_forward(POINTS).process(&mut lines);
+    tracktwin_fourier::forward(POINTS).process(&mut lines);
     lines.iter().map(|line| line.exp()).collect()
 }
 
@@ -96,13 +95,13 @@ fn template(form: Form, length_m: f64, whitening: &[Complex64], step_m: f64) -> 
     let height = |point: usize| form.height((point as f64 - middle as f64) * step_m, length_m);
     let mut lines: Vec<Complex64> =
         (0..POINTS).map(|point| Complex64::new(height(point), 0.0)).collect();
-    FftPlanner::new().plan_fft_forward(POINTS).process(&mut lines);
+    tracktwin_fourier::forward(POINTS).process(&mut lines);
     let mut fine = vec![Complex64::ZERO; PARTS * POINTS];
     for (line, (value, gain)) in lines.iter().zip(whitening).enumerate() {
         let place = if line < middle { line } else { line + (PARTS - 1) * POINTS };
         fine[place] = value * gain / POINTS as f64;
     }
-    FftPlanner::new().plan_fft_inverse(fine.len()).process(&mut fine);
+    tracktwin_fourier::inverse(fine.len()).process(&mut fine);
     fine.iter().map(|value| value.re).collect()
 }
 

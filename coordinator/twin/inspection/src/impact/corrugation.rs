@@ -4,7 +4,7 @@ use crate::along::{
     Background, Line, Ruler, Spectrum, Surface, amplitude, bonferroni, by_speed,
     combine_dependent_p_values, median, on_even_places, separate_wavelengths, speed_m_s, whitened,
 };
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use tracktwin_signal::recording::{Pass, Recording};
 
 /// Shortest and longest tested wavelength, in sleeper spacings: 2 mm to 62 mm for a spacing of 125 mm.

@@ -6,8 +6,7 @@
 
 use super::repeated::ImpactKind;
 use crate::along::{Background, Surface, hann, speed_m_s};
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 use tracktwin_signal::recording::{Pass, Recording};
 use tracktwin_track::model::ContactPatch;
@@ -131,7 +130,7 @@ fn spectrum(segment: &[f64], before: usize, rate: f64) -> (Vec<f64>, f64) {
         .enumerate()
         .map(|(index, value)| Complex64::new((value - mean) * weight(index), 0.0))
         .collect();
-    FftPlanner::new().plan_fft_forward(length).process(&mut lines);
+    tracktwin_fourier::forward(length).process(&mut lines);
     let power =
         lines[..length / 2].iter().map(|line| 2.0 * line.norm_sqr() / (rate * rate)).collect();
     (power, (0..length).map(|index| weight(index).powi(2)).sum::<f64>() / rate)

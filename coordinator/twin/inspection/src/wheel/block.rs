@@ -1,8 +1,7 @@
 //! One block of a pass: its periodogram, and the power that combs explain.
 
 use crate::along::hann;
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use tracktwin_signal::recording::Pass;
 
 /// Number of bins per resolution cell.
@@ -53,7 +52,7 @@ impl Block {
             .map(|(i, value)| Complex64::from((value - mean) * hann(i, count)))
             .collect();
         lines.resize(count * PADDING, Complex64::ZERO);
-        FftPlanner::new().plan_fft_forward(lines.len()).process(&mut lines);
+        tracktwin_fourier::forward(lines.len()).process(&mut lines);
         let positions = &pass.position_m[start..start + length];
         Self {
             start_s: start as f64 / rate,

@@ -8,7 +8,7 @@ use crate::along::{
     Line, Ruler, Spectrum, Surface, amplitude, bonferroni, by_speed, combine_dependent_p_values,
     on_even_places, separate_wavelengths, speed_m_s,
 };
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use std::f64::consts::FRAC_1_SQRT_2;
 use tracktwin_signal::recording::{Pass, Recording};
 

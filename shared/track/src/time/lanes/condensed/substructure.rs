@@ -8,7 +8,7 @@
 use crate::model::Matrices;
 use faer::linalg::solvers::{Llt, Solve};
 use faer::{Mat, Side};
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap};
 
