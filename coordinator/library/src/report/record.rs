@@ -3,7 +3,7 @@
 use super::{Report, ReportVerdict};
 use crate::attempt::{self, Ended};
 use crate::engine::{Connection, Row, Text, Write, sql};
-use crate::result::insert_results;
+use crate::result::{self, insert_results};
 use crate::state::Ending;
 use crate::tally::Tally;
 use crate::{Held, LibraryError, State, audit};
@@ -195,8 +195,10 @@ impl Report {
         if finished.is_empty() {
             return Ok(());
         }
-        insert_results(connection, self, finished, flagged).await?;
         let indices = finished.iter().map(|(case, _)| i64::from(case.index)).collect::<Vec<_>>();
+        // An interrupted copy leaves single passes of a case.
+        result::discard(connection, &self.campaign, &indices).await?;
+        insert_results(connection, self, finished, flagged).await?;
         connection
             .execute(sql(FINISH).bind(&self.campaign).bind(&self.worker).bind(indices))
             .await?;

@@ -210,6 +210,22 @@ on conflict (campaign_id, from_unix_s, writer) do update set
 --       ->  Result
 
 -- 4
+with discarded as (
+    delete from case_result where campaign_id = $1 and sobol_index = any($2) returning id)
+delete from case_series where result_id in (select id from discarded);
+--     Delete on case_series
+--       CTE discarded
+--         ->  Delete on case_result
+--               ->  Index Scan using results_of_a_case_are_one_row on case_result
+--                     Index Cond: ((campaign_id = $1) AND (sobol_index = ANY ($2)))
+--       ->  Nested Loop
+--             ->  HashAggregate
+--                   Group Key: discarded.id
+--                   ->  CTE Scan on discarded
+--             ->  Index Scan using a_pass_has_one_series on case_series
+--                   Index Cond: (result_id = discarded.id)
+
+-- 5
 with given as (
     select sobol_index, duration_s, parameter_hash, checksum, cast(place as integer) as place
     from unnest($8::bigint[], $9::double precision[], $10::text[], $11::text[]) with ordinality
@@ -254,14 +270,14 @@ from stored join given using (sobol_index), size, generate_series(1, passes) as 
 --                   Cache Mode: binary
 --                   ->  Function Scan on generate_series pass
 
--- 5
+-- 6
 update campaign_case set state = 'finished', worker = $2, error = null, lease_expires_unix_ms = null
 where campaign_id = $1 and sobol_index = any($3);
 --     Update on campaign_case
 --       ->  Index Scan using a_case_has_one_place_in_its_campaign on campaign_case
 --             Index Cond: ((campaign_id = $1) AND (sobol_index = ANY ($3)))
 
--- 6
+-- 7
 insert into audit (campaign_id, sobol_index, worker)
 select campaign_id, sobol_index, $3 from campaign_case
 where campaign_id = $1 and sobol_index = any($2)
@@ -318,6 +334,8 @@ where campaign_id = $1 and worker = $2 and sobol_index = any($3);
 -- 6: as 4 of "a report of a result, drawn for an audit"
 
 -- 7: as 5 of "a report of a result, drawn for an audit"
+
+-- 8: as 6 of "a report of a result, drawn for an audit"
 
 -- ## the same report again
 

@@ -196,12 +196,19 @@ on conflict (campaign_id, from_unix_s, writer) do update set
     busy_s = progress.busy_s + excluded.busy_s;
 
 -- 4
+delete from result where campaign_id = $1 and sobol_index in (select value from json_each($2));
+--     SEARCH result USING COVERING INDEX sqlite_autoindex_result_1 (campaign_id=? AND sobol_index=?)
+--     LIST SUBQUERY 1
+--     SCAN json_each VIRTUAL TABLE INDEX 1:
+--     CREATE BLOOM FILTER
+
+-- 5
 insert into result (campaign_id, worker, code_version, model_hash,
     experiment_hash, finished_at, flagged, sobol_index, speed_km_h, duration_s, parameter_hash, checksum,
     contact_loss_share, log_power, level_50_Hz_dB, level_63_Hz_dB, level_80_Hz_dB, level_100_Hz_dB, level_125_Hz_dB, level_160_Hz_dB, level_200_Hz_dB, level_250_Hz_dB, level_315_Hz_dB, level_400_Hz_dB, level_500_Hz_dB, level_630_Hz_dB, level_800_Hz_dB, level_1000_Hz_dB, level_1250_Hz_dB, level_1600_Hz_dB, level_2000_Hz_dB, level_2500_Hz_dB, level_3150_Hz_dB, level_4000_Hz_dB) values ($55, $56, $57, $58, $59, $60, $61, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?), ($55, $56, $57, $58, $59, $60, $61, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?);
 --     SCAN 2-ROW VALUES CLAUSE
 
--- 5
+-- 6
 update campaign_case set state = 'finished', worker = $2, error = null, lease_expires_unix_ms = null
 where campaign_id = $1 and sobol_index in (select value from json_each($3));
 --     SEARCH campaign_case USING PRIMARY KEY (campaign_id=? AND sobol_index=?)
@@ -209,7 +216,7 @@ where campaign_id = $1 and sobol_index in (select value from json_each($3));
 --     SCAN json_each VIRTUAL TABLE INDEX 1:
 --     CREATE BLOOM FILTER
 
--- 6
+-- 7
 insert into audit (campaign_id, sobol_index, worker)
 select campaign_id, sobol_index, $3 from campaign_case
 where campaign_id = $1 and sobol_index in (select value from json_each($2))
@@ -262,6 +269,8 @@ where campaign_id = $1 and worker = $2 and sobol_index in (select value from jso
 -- 6: as 4 of "a report of a result, drawn for an audit"
 
 -- 7: as 5 of "a report of a result, drawn for an audit"
+
+-- 8: as 6 of "a report of a result, drawn for an audit"
 
 -- ## the same report again
 
