@@ -65,9 +65,13 @@ pub(crate) fn section(inversion: &Inversion, models: &Evaluation) -> Markup {
     }
 }
 
-/// Banner on the sleepers whose estimates are not valid and on an unusual value, and the other notes below it.
+/// Banner on the sleepers whose estimates are not valid, on an unusual value and on misplaced sleepers, and the other notes below it.
 fn banner(inversion: &Inversion) -> Markup {
-    let alerts = [inversion.unexplained_sentence(), inversion.unusual_sentence()];
+    let alerts = [
+        inversion.unexplained_sentence(),
+        inversion.unusual_sentence(),
+        inversion.misplaced_sentence(),
+    ];
     let alerts: Vec<String> = alerts.into_iter().flatten().collect();
     html! {
         @if !alerts.is_empty() {
@@ -270,6 +274,7 @@ mod tests {
             support_changes: Vec::new(),
             outside_library: Unexplained::default(),
             unusual: None,
+            sleeper_pattern: None,
             notes: Vec::new(),
         };
         inversion.notes = inversion.sentences();

@@ -33,6 +33,7 @@ mod search;
 mod section;
 mod sentence;
 mod signature;
+mod sleeper_pattern;
 mod spectra;
 mod suggestion;
 mod transfer;
@@ -65,6 +66,7 @@ pub use screen::{Template, templates};
 pub use search::{Fitted, Round, SearchOutcome, Stage, first_calibration, search};
 pub use section::{Section, owner};
 pub use signature::signature;
+pub use sleeper_pattern::SleeperPattern;
 pub use spectra::{Spectra, SpeedSpectra, are_one_speed};
 pub use tracktwin_inspection::separate_wavelengths;
 pub use variation::{

@@ -11,7 +11,7 @@ use tracktwin_track::model::Mesh;
 const SPANS_BEYOND: usize = 16;
 
 /// Number of rail elements per span and of elements per half sleeper (docs/accuracy.md).
-const ELEMENTS: usize = 8;
+pub(crate) const ELEMENTS: usize = 8;
 
 /// Reach of a window beyond its ends, in standard deviations of its blur.
 const BLUR_REACH: f64 = 3.5;

@@ -4,7 +4,7 @@ use crate::fit::Fitted;
 use crate::record::{Along, Inversion, Parts, Prior, Provenance, Sleeper, Unusual, log_normal};
 use std::collections::BTreeMap;
 use tracktwin_diagnosis::{
-    Amplitude, Common, FoundSupportChange, Mean, Own, PreparedRecording, Unknowns,
+    Amplitude, Common, FoundSupportChange, Mean, Own, PreparedRecording, SleeperPattern, Unknowns,
     joined_support_changes, owner, separate_wavelengths,
 };
 use tracktwin_evaluation::{Estimates, Flag, Unevaluated};
@@ -49,11 +49,14 @@ impl Inversion {
         let ids: Vec<String> = recording.sleepers.iter().map(|place| place.id.clone()).collect();
         let changes = joined_support_changes(&ids, &found);
         let unusual = sections.iter().filter_map(|(prepared, fitted)| fitted.unusual(prepared));
+        let fitted: Vec<_> =
+            sections.iter().map(|(prepared, it)| (prepared, &it.unknowns, &it.values)).collect();
         let parts = Parts {
             sleepers,
             unevaluated,
             support_changes: changes,
             unusual: unusual.max_by(|a, b| a.deviations.total_cmp(&b.deviations)),
+            sleeper_pattern: SleeperPattern::of(recording, &fitted),
         };
         Self::new(recording.name.clone(), provenance(sections), parts)
     }

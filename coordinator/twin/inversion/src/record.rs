@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use std::collections::BTreeMap;
-use tracktwin_diagnosis::{FoundSupportChange, Variation, separate_wavelengths};
+use tracktwin_diagnosis::{FoundSupportChange, SleeperPattern, Variation, separate_wavelengths};
 use tracktwin_evaluation::{Estimate, Estimates, FORMAT, Flag, Unevaluated};
 use tracktwin_number::NORMAL_90;
 use tracktwin_parameters::Parameter;
@@ -39,6 +39,8 @@ pub struct Inversion {
     pub outside_library: Unexplained,
     /// The value of the measurement or of all sleepers that is farthest from what was expected.
     pub unusual: Option<Unusual>,
+    /// Where the sleepers lie by the levels within a span, if these show it.
+    pub sleeper_pattern: Option<SleeperPattern>,
     /// Notes on the result, one sentence each.
     pub notes: Vec<String>,
 }
@@ -120,6 +122,7 @@ pub(crate) struct Parts {
     pub(crate) unevaluated: Vec<Unevaluated>,
     pub(crate) support_changes: Vec<FoundSupportChange>,
     pub(crate) unusual: Option<Unusual>,
+    pub(crate) sleeper_pattern: Option<SleeperPattern>,
 }
 
 /// Part of a recording that the track model does not explain. The field names are those of an evaluation by
@@ -152,7 +155,7 @@ impl Sleeper {
 impl Inversion {
     /// Makes the record from its parts.
     pub(crate) fn new(recording: String, provenance: Provenance, parts: Parts) -> Self {
-        let Parts { sleepers, unevaluated, support_changes, unusual } = parts;
+        let Parts { sleepers, unevaluated, support_changes, unusual, sleeper_pattern } = parts;
         let invalid = sleepers.iter().filter(|sleeper| !sleeper.is_valid()).count();
         let share = invalid as f64 / sleepers.len().max(1) as f64;
         let mut inversion = Self {
@@ -165,6 +168,7 @@ impl Inversion {
             support_changes,
             outside_library: Unexplained { share, widen: Vec::new() },
             unusual,
+            sleeper_pattern,
             notes: Vec::new(),
         };
         inversion.notes = inversion.sentences();
@@ -196,7 +200,12 @@ impl Inversion {
         ))
     }
 
-    /// Sentences on a single speed, on an unusual value, on sleepers that the track model does not explain, on support changes,
+    /// Sentence on sleepers that do not lie at their stated positions, as it stands in the notes.
+    pub fn misplaced_sentence(&self) -> Option<String> {
+        self.sleeper_pattern.as_ref().and_then(SleeperPattern::doubt)
+    }
+
+    /// Sentences on a single speed, on an unusual value, on misplaced sleepers, on sleepers that the track model does not explain, on support changes,
     /// on sleepers that differ from their neighbours, and on those whose railpad is too stiff to be resolved.
     pub fn sentences(&self) -> Vec<String> {
         let apart = self.with(Flag::UnlikeNeighbours);
@@ -212,6 +221,7 @@ impl Inversion {
             ));
         }
         sentences.extend(self.unusual_sentence());
+        sentences.extend(self.misplaced_sentence());
         sentences.extend(self.unexplained_sentence());
         sentences.extend(self.support_changes.iter().map(FoundSupportChange::sentence));
         if !apart.is_empty() {
@@ -284,6 +294,7 @@ mod tests {
                 unevaluated: Vec::new(),
                 support_changes: Vec::new(),
                 unusual,
+                sleeper_pattern: None,
             };
             Inversion::new("ride".to_owned(), provenance, parts).notes
         };

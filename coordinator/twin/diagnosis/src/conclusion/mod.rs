@@ -21,6 +21,7 @@ use crate::outcome::{Diagnosis, FORMAT, Hypothesis, Location, UNKNOWN, Verdict, 
 use crate::prepared_recording::PreparedRecording;
 use crate::search::SearchOutcome;
 use crate::sentence::sentence;
+use crate::sleeper_pattern::SleeperPattern;
 use tracktwin_inspection::chain::PassDefect;
 use tracktwin_inspection::wheel::Order;
 use tracktwin_inspection::{Inspection, separate_wavelengths};
@@ -105,11 +106,11 @@ impl Evidence<'_> {
         let loss_of_contact = self.inspection.loss_of_contact.clone();
         let track = self.track();
         let unlike = unlike_neighbours(&track, verdict, &hypotheses);
-        let sentence = said
-            + &further(&support_changes, loss_of_contact.as_ref())
-            + unlike.as_deref().unwrap_or_default();
+        let doubts: Vec<String> = unlike.into_iter().chain(self.misplaced()).collect();
+        let sentence =
+            said + &further(&support_changes, loss_of_contact.as_ref()) + &doubts.concat();
         let mut notes = self.notes(&hypotheses);
-        notes.extend(unlike.map(|line| line.trim_start().to_owned()));
+        notes.extend(doubts.iter().map(|doubt| doubt.trim_start().to_owned()));
         Ok(Diagnosis {
             format: FORMAT.to_owned(),
             recording: self.recording.name.clone(),
@@ -128,6 +129,12 @@ impl Evidence<'_> {
             notes,
             sections: Vec::new(),
         })
+    }
+
+    /// Sentence on sleepers that do not lie at their stated positions, with a space before it.
+    fn misplaced(&self) -> Option<String> {
+        let fitted = (self.prepared, &self.prepared.forward.unknowns, &self.search.last.values);
+        Some(format!(" {}", SleeperPattern::of(self.recording, &[fitted])?.doubt()?))
     }
 
     /// Probability that waves of the rail lie near an order by chance; `None` if passes at one speed differ by it.

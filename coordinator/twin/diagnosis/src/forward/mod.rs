@@ -301,7 +301,7 @@ impl Forward {
 
     /// Power spectral density of the surface in m2/Hz, at level one with the baseline's spectrum:
     /// `[speed][line]`.
-    fn excitation(&self, transfer: &Transfer, values: &DVector<f64>) -> Vec<Vec<f64>> {
+    pub(crate) fn excitation(&self, transfer: &Transfer, values: &DVector<f64>) -> Vec<Vec<f64>> {
         let of_line = |speed_m_s: f64, (&hz, &surface): (&f64, &f64)| {
             let wave_number = TAU * hz / speed_m_s;
             let shares = self.unknowns.spectrum_shares(wave_number);

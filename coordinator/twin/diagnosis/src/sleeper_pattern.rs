@@ -1,0 +1,293 @@
+//! Position of the sleepers by the pattern that they give the levels within a span.
+//!
+//! Near the pinned-pinned resonance the levels above a sleeper and between two sleepers differ by some decibels. The
+//! phase of this pattern tells where the sleepers lie. An error of the odometer that is the same in all passes is
+//! visible in nothing else.
+
+use crate::bands::{Bands, CENTRE_RAD};
+use crate::baseline::Unknowns;
+use crate::forward::Forward;
+use crate::prepared_recording::PreparedRecording;
+use crate::section::ELEMENTS;
+use crate::spectra::log_powers;
+use nalgebra::DVector;
+use num_complex::Complex64;
+use rayon::prelude::*;
+use serde::Serialize;
+use std::f64::consts::{SQRT_2, TAU};
+use tracktwin_signal::recording::{Recording, SleeperWindow};
+
+/// Smallest number of spans that tell a pattern from the scatter of the surface.
+const SPANS_MIN: usize = 8;
+
+/// Largest amplitude of the pattern of one span in nats: 6 dB. A defect of the rail is no pattern.
+const AMPLITUDE_MAX: f64 = 1.4;
+
+/// Smallest contrast of a pattern. By chance one recording in 3000 has it: the square of the amplitude is exponentially
+/// distributed.
+const CONTRAST_MIN: f64 = 4.0;
+
+/// Distance of the sleepers from their stated positions that is an error, as a share of the spacing, and in standard
+/// deviations.
+const OFFSET_MIN: f64 = 0.1;
+const DEVIATIONS_MIN: f64 = 3.0;
+
+/// Position of the sleepers relative to the stated positions.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct SleeperPattern {
+    /// Distance in m by which the sleepers lie further along the track than stated, at most half a spacing.
+    pub shift_m: f64,
+    /// Standard deviation of the distance in m.
+    pub deviation_m: f64,
+    /// Amplitude of the pattern divided by its standard deviation.
+    pub contrast: f64,
+    /// Sleeper spacing in m.
+    pub spacing_m: f64,
+}
+
+impl SleeperPattern {
+    /// The pattern of a recording under tracks with fitted values. `None` if it is not visible.
+    pub fn of(
+        recording: &Recording,
+        sections: &[(&PreparedRecording, &Unknowns, &DVector<f64>)],
+    ) -> Option<Self> {
+        let (first, ..) = sections.first()?;
+        let measured = Measured::of(recording, first);
+        let mut spans = vec![None; recording.sleepers.len()];
+        for (prepared, unknowns, values) in sections {
+            let mut forward = prepared.forward.clone();
+            forward.unknowns = (*unknowns).clone();
+            let expected = forward.span_pattern(values)?;
+            let sleepers = prepared.sleepers();
+            for (span, found) in
+                (sleepers.start..sleepers.end - 1).zip(&mut spans[sleepers.start..])
+            {
+                *found = measured.along(span, &expected);
+            }
+        }
+        let spans: Vec<Complex64> = spans.into_iter().flatten().collect();
+        (spans.len() >= SPANS_MIN)
+            .then(|| Self::from_spans(&spans, recording.spacing_m))
+            .filter(|pattern| pattern.contrast > CONTRAST_MIN)
+    }
+
+    /// Sentence on sleepers that do not lie where the recording states them.
+    pub fn doubt(&self) -> Option<String> {
+        let Self { shift_m, deviation_m, spacing_m, .. } = *self;
+        let least_m = (OFFSET_MIN * spacing_m).max(DEVIATIONS_MIN * deviation_m);
+        (shift_m.abs() > least_m).then(|| {
+            let [side, remedy] = if shift_m < 0.0 {
+                ["before", "subtract it from"]
+            } else {
+                ["after", "add it to"]
+            };
+            format!(
+                "By the levels within a span, the sleepers lie {:.3} m (± {deviation_m:.3} m) {side} their stated \
+                 positions in all passes, and the estimates belong to places between sleepers. Check the positions; \
+                 if the odometer has this offset, {remedy} `x_m` of every sleeper in recording.json.",
+                shift_m.abs()
+            )
+        })
+    }
+
+    fn from_spans(spans: &[Complex64], spacing_m: f64) -> Self {
+        let count = spans.len() as f64;
+        let mean = spans.iter().sum::<Complex64>() / count;
+        let direction = mean / mean.norm();
+        let variance = |part: fn(Complex64) -> f64| {
+            let of = |span: &Complex64| part((span - mean) * direction.conj()).powi(2);
+            spans.iter().map(of).sum::<f64>() / (count * (count - 1.0))
+        };
+        let per_radian_m = spacing_m / TAU;
+        Self {
+            shift_m: -mean.arg() * per_radian_m,
+            deviation_m: variance(|it| it.im).sqrt() / mean.norm() * per_radian_m,
+            contrast: mean.norm() / variance(|it| it.re).max(variance(|it| it.im)).sqrt(),
+            spacing_m,
+        }
+    }
+}
+
+/// First harmonic of the log powers within each span, with the stated position of its sleeper as origin.
+struct Measured {
+    /// `[span][speed and band]`; `None` where no pass of a speed covers the span.
+    harmonics: Vec<Option<Vec<Complex64>>>,
+    /// Mean square of the harmonics of one span, for each speed and band.
+    variance: Vec<f64>,
+}
+
+impl Measured {
+    fn of(recording: &Recording, prepared: &PreparedRecording) -> Self {
+        let bands = &prepared.forward.bands;
+        let of_speed = |passes: &Vec<usize>| -> Vec<_> {
+            let all: Vec<_> =
+                passes.par_iter().map(|&pass| of_pass(recording, pass, bands)).collect();
+            (0..recording.sleepers.len() - 1).map(|span| mean_of(&all, span)).collect()
+        };
+        let speeds: Vec<Vec<_>> = prepared.pass_numbers.iter().map(of_speed).collect();
+        let span = |span: usize| -> Option<Vec<Complex64>> {
+            let of_speeds: Option<Vec<_>> = speeds.iter().map(|it| it[span].clone()).collect();
+            Some(of_speeds?.concat())
+        };
+        let harmonics: Vec<_> = (0..recording.sleepers.len() - 1).map(span).collect();
+        let known: Vec<_> = harmonics.iter().flatten().collect();
+        let count = known.len() as f64;
+        let square = |at: usize| known.iter().map(|it| it[at].norm_sqr()).sum::<f64>() / count;
+        let width = prepared.forward.per_sleeper();
+        Self { variance: (0..width).map(square).collect(), harmonics }
+    }
+
+    /// Sum over speeds and bands of a span's harmonics times those expected, weighted by their variance.
+    fn along(&self, span: usize, expected: &[Complex64]) -> Option<Complex64> {
+        let harmonics = self.harmonics[span].as_ref()?;
+        let terms = harmonics.iter().zip(expected).zip(&self.variance);
+        Some(terms.map(|((it, expected), variance)| it * expected.conj() / variance).sum())
+    }
+}
+
+/// First harmonic of a pass's log powers, `[span][band]`.
+fn of_pass(recording: &Recording, pass: usize, bands: &Bands) -> Vec<Option<Vec<Complex64>>> {
+    let pass = &recording.passes[pass];
+    let width_m = recording.spacing_m / ELEMENTS as f64;
+    let windows: Vec<_> = recording
+        .sleepers
+        .windows(2)
+        .flat_map(|pair| {
+            let step_m = (pair[1].x_m - pair[0].x_m) / ELEMENTS as f64;
+            (0..ELEMENTS).map(move |place| pair[0].x_m + place as f64 * step_m)
+        })
+        .map(|x_m| SleeperWindow::around(x_m, width_m).samples(&pass.position_m))
+        .collect();
+    let powers = log_powers(&pass.signal, &windows, bands);
+    let span = |places: &[Option<Vec<f64>>]| {
+        let places: Option<Vec<&Vec<f64>>> = places.iter().map(Option::as_ref).collect();
+        let places = places?;
+        let band = |band: usize| {
+            let harmonic = first_harmonic(places.iter().map(|powers| powers[band]));
+            harmonic * (AMPLITUDE_MAX / harmonic.norm()).min(1.0)
+        };
+        Some((0..bands.count()).map(band).collect())
+    };
+    powers.chunks(ELEMENTS).map(span).collect()
+}
+
+/// Mean over the passes that cover a span; `None` if none does.
+fn mean_of(passes: &[Vec<Option<Vec<Complex64>>>], span: usize) -> Option<Vec<Complex64>> {
+    let covered: Vec<_> = passes.iter().filter_map(|pass| pass[span].as_ref()).collect();
+    let first = covered.first()?;
+    let mean =
+        |band: usize| covered.iter().map(|it| it[band]).sum::<Complex64>() / covered.len() as f64;
+    Some((0..first.len()).map(mean).collect())
+}
+
+/// Amplitude and phase of one period over equidistant places of a span.
+fn first_harmonic(places: impl Iterator<Item = f64>) -> Complex64 {
+    let turned = |(place, value): (usize, f64)| {
+        value * Complex64::cis(-TAU * place as f64 / ELEMENTS as f64)
+    };
+    places.enumerate().map(turned).sum::<Complex64>() * 2.0 / ELEMENTS as f64
+}
+
+impl Forward {
+    /// First harmonic of the log powers within a span, in the mean over the spans: `[speed and band]`. `None` if no
+    /// track model exists for the values.
+    fn span_pattern(&self, values: &DVector<f64>) -> Option<Vec<Complex64>> {
+        let transfer = self.transfer(values, &[], false).ok()?;
+        let excitation = self.excitation(&transfer, values);
+        let spacing_m = self.section.track.design.sleeper.spacing_m;
+        let spans = self.section.sleepers - 1;
+        let of = |speed: usize, band: usize| {
+            let power = |node: usize| {
+                let lines = self.bands.weights(band).iter();
+                let power = |&(line, weight): &(usize, f64)| {
+                    weight * excitation[speed][line] * transfer.power[line][node]
+                };
+                lines.map(power).sum::<f64>()
+            };
+            let span = |sleeper: usize| {
+                let first = self.section.seat_node(sleeper);
+                first_harmonic((first..first + ELEMENTS).map(|node| power(node).ln()))
+            };
+            let mean = (0..spans).map(span).sum::<Complex64>() / spans as f64;
+            // The wavelet blurs positions (`Section::window`).
+            let centre_hz = self.bands.centres_hz()[band];
+            let blur = self.speeds_m_s[speed] * CENTRE_RAD / (TAU * centre_hz * SQRT_2) / spacing_m;
+            mean * (-0.5 * (TAU * blur).powi(2)).exp()
+        };
+        let speeds = 0..self.speeds_m_s.len();
+        Some(
+            speeds
+                .flat_map(|speed| (0..self.bands.count()).map(move |band| (speed, band)))
+                .map(|(speed, band)| of(speed, band))
+                .collect(),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_chacha::ChaCha8Rng;
+    use rand_chacha::rand_core::{Rng, SeedableRng};
+    use tracktwin_parameters::Preset;
+    use tracktwin_signal::Signal;
+    use tracktwin_signal::recording::{Pass, Sleeper};
+
+    const SPACING_M: f64 = 0.125;
+    const RATE_HZ: f64 = 4e4;
+
+    /// Two passes of noise whose level repeats with the sleepers of V-Track, `shift_m` after their stated positions.
+    fn recording(amplitude: f64, shift_m: f64) -> Recording {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let mut pass = |speed_km_h: f64| {
+            let step_m = speed_km_h / 3.6 / RATE_HZ;
+            let position_m: Vec<f64> =
+                (0..(3.6 / step_m) as usize).map(|n| n as f64 * step_m).collect();
+            let mut sample = |x_m: &f64| {
+                let uniform = random.next_u64() as f64 / u64::MAX as f64 - 0.5;
+                uniform * (0.5 * amplitude * (TAU * (x_m - shift_m) / SPACING_M).cos()).exp()
+            };
+            let samples = position_m.iter().map(&mut sample).collect();
+            let signal = Signal::new(RATE_HZ, samples).unwrap();
+            let (file, axle, contact_loss_share) = (String::new(), None, None);
+            Pass { file, speed_km_h, axle, signal, position_m, contact_loss_share }
+        };
+        let passes = vec![pass(13.0), pass(7.0)];
+        let sleeper = |n: u32| Sleeper { id: format!("SN{n}"), x_m: SPACING_M * f64::from(n) };
+        Recording {
+            name: "noise".to_owned(),
+            sample_rate_hz: RATE_HZ,
+            channel: String::new(),
+            passes,
+            sleepers: (0..28).map(sleeper).collect(),
+            nominal: serde_json::Map::new(),
+            spacing_m: SPACING_M,
+            doubts: Vec::new(),
+        }
+    }
+
+    fn pattern(recording: &Recording) -> Option<SleeperPattern> {
+        let prepared = PreparedRecording::new(recording, &Preset::VTrack.track(), &[]).unwrap();
+        let unknowns = prepared.forward.unknowns.clone();
+        let values = unknowns.typical();
+        SleeperPattern::of(recording, &[(&prepared, &unknowns, &values)])
+    }
+
+    #[test]
+    fn sleepers_that_lie_elsewhere_are_found() {
+        let found = pattern(&recording(0.4, 0.0)).unwrap();
+        assert!(found.shift_m.abs() < 0.004 && found.doubt().is_none(), "{found:?}");
+        for shift_m in [-0.05, 0.04] {
+            let found = pattern(&recording(0.4, shift_m)).unwrap();
+            assert!((found.shift_m - shift_m).abs() < 3.0 * found.deviation_m, "{found:?}");
+            let doubt = found.doubt().unwrap();
+            let remedy = if shift_m < 0.0 { "subtract it from" } else { "add it to" };
+            assert!(found.deviation_m < 0.004 && doubt.contains(remedy), "{doubt}");
+        }
+    }
+
+    #[test]
+    fn without_a_pattern_nothing_is_said() {
+        assert_eq!(pattern(&recording(0.0, 0.0)), None);
+    }
+}
