@@ -6,13 +6,17 @@ use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
 use tracktwin_signal::{Extractor, SAMPLES_A_PERIOD};
 
+/// Largest deviation of the distance of two sleepers from a multiple of the spacing, as a share of the spacing.
+const UNEVEN: f64 = 0.1;
+
 /// Compares the track, vehicle, sensor and speeds stated in a recording with those of the models.
 ///
 /// Quantities missing in `recording.json` are not compared.
 ///
 /// # Errors
 /// [`Error::GainUnknown`]; [`Error::UnknownSpeed`] with the first pass that models for `speeds_km_h`
-/// cannot evaluate; [`Error::OtherTrack`] with the first quantity that differs by more than 2 %.
+/// cannot evaluate; [`Error::OtherTrack`] with the first quantity that differs by more than 2 %;
+/// [`Error::Uneven`] with the first distance of two sleepers that is no multiple of the models' spacing.
 pub fn check_recording(
     recording: &Recording,
     design: &TrackDesign,
@@ -22,10 +26,27 @@ pub fn check_recording(
         return Err(Error::GainUnknown);
     }
     recording.check_track(design)?;
+    check_spacings(recording, design.sleeper.spacing_m)?;
     for pass in &recording.passes {
         speeds::check(recording, pass.speed_km_h, speeds_km_h)?;
     }
     Ok(())
+}
+
+/// Checks that neighbouring sleepers are one or several of the models' spacings in m apart.
+fn check_spacings(recording: &Recording, spacing_m: f64) -> Result<(), Error> {
+    let uneven = recording.sleepers.windows(2).find(|pair| {
+        let spacings = (pair[1].x_m - pair[0].x_m) / spacing_m;
+        (spacings - spacings.round().max(1.0)).abs() > UNEVEN
+    });
+    match uneven {
+        Some(pair) => Err(Error::Uneven {
+            between: [0, 1].map(|end| pair[end].id.clone()),
+            distance_m: pair[1].x_m - pair[0].x_m,
+            spacing_m,
+        }),
+        None => Ok(()),
+    }
 }
 
 /// Checks that a sample rate in Hz is high enough for the features of the models.
@@ -77,6 +98,15 @@ mod tests {
         assert!(text.starts_with("nominal.sleeper.spacing_m is 0.6 m, the models are of 0.125 m"));
         let text = refusal(|recording| recording.sleepers.iter_mut().for_each(|s| s.x_m *= 1.12));
         assert!(text.contains("in the recording is 0.14 m, the models are of 0.125 m"), "{text}");
+        let text = refusal(|recording| recording.sleepers[3].x_m += 0.02);
+        assert!(
+            text.contains("between SN2 and SN3 is 0.145 m, that of the models 0.125 m"),
+            "{text}"
+        );
+        let gap = |recording: &mut Recording| drop(recording.sleepers.remove(3));
+        let mut listed = same.clone();
+        gap(&mut listed);
+        check_recording(&listed, &TrackDesign::v_track(), &[10.0]).unwrap();
         let nominal = |part: &str, value: Value| {
             refusal(|recording| drop(recording.nominal.insert(part.to_owned(), value.clone())))
         };

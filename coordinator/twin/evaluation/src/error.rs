@@ -45,6 +45,19 @@ pub enum Error {
         .0.quantity, .0.found(), .0.known()
     )]
     OtherTrack(OtherTrack),
+    /// Two sleepers have another distance than those of the models.
+    #[error(
+        "recording.json: sleepers: the distance between {} and {} is {distance_m:.3} m, that of the models \
+         {spacing_m} m or a multiple; correct `x_m`, or leave out unevenly spaced sleepers", .between[0], .between[1]
+    )]
+    Uneven {
+        /// Ids of the two sleepers.
+        between: [String; 2],
+        /// Distance of the two sleepers in m.
+        distance_m: f64,
+        /// Sleeper spacing of the models in m.
+        spacing_m: f64,
+    },
     /// There is no model for these speeds and this feature set.
     #[error("the {feature} model for {} km/h is missing; train it", join(speeds_km_h))]
     NoModel {

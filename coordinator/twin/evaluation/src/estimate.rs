@@ -79,7 +79,7 @@ pub fn evaluate(recording: &Recording, twin: &Twin<'_>) -> Result<Evaluation, Er
         provenance: provenance(twin, &sleepers),
         sleepers,
         unevaluated: unseen.iter().map(|sleeper| unevaluated(recording, sleeper)).collect(),
-        notes: [outside_library.sentences(), speeds.note(recording).into_iter().collect()].concat(),
+        notes: [outside_library.sentences(), speeds.notes(recording)].concat(),
         outside_library,
         unevenness,
         frequencies_hz: twin.models.frequencies_hz().to_vec(),

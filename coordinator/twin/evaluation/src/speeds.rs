@@ -7,7 +7,7 @@
 
 use crate::Error;
 use tracktwin_number::rounded;
-use tracktwin_signal::recording::Recording;
+use tracktwin_signal::recording::{Pass, Recording};
 use tracktwin_surrogate::TrainingSet;
 
 /// Relative difference between the speeds of a pass and of a model below which the speeds count as equal.
@@ -79,12 +79,36 @@ impl ModelSpeeds {
         Some(PassSpeed { speed, bins: self.bins, shift })
     }
 
+    /// Speed in km/h at which a pass is evaluated: the stated one, or that of its positions if these differ and models
+    /// can evaluate it.
+    fn speed_of(&self, pass: &Pass) -> f64 {
+        let by_positions = pass.mean_speed_km_h();
+        let differs = is_misstated(pass) && self.of_pass(by_positions).is_some();
+        if differs { by_positions } else { pass.speed_km_h }
+    }
+
+    /// Sentences on passes at speeds between those of the models and on passes with another speed than stated.
+    pub(crate) fn notes(&self, recording: &Recording) -> Vec<String> {
+        let misstated = recording.passes.iter().filter(|pass| is_misstated(pass)).map(|pass| {
+            format!(
+                "{}: recording.json states {} km/h, but the positions give {:.1} km/h; the pass is evaluated as one \
+                 at {:.1} km/h. Correct `speed_km_h` or the positions.",
+                pass.file,
+                rounded(pass.speed_km_h, 4),
+                pass.mean_speed_km_h(),
+                self.speed_of(pass)
+            )
+        });
+        misstated.chain(self.note(recording)).collect()
+    }
+
     /// Sentence on the passes of a recording at speeds between those of the models, if there are any.
-    pub(crate) fn note(&self, recording: &Recording) -> Option<String> {
+    fn note(&self, recording: &Recording) -> Option<String> {
         let mut moved: Vec<[f64; 2]> = Vec::new();
         for pass in &recording.passes {
-            let found = self.of_pass(pass.speed_km_h).filter(|found| !found.shift.is_empty());
-            let pair = found.map(|found| [pass.speed_km_h, self.known_km_h[found.speed]]);
+            let speed_km_h = self.speed_of(pass);
+            let found = self.of_pass(speed_km_h).filter(|found| !found.shift.is_empty());
+            let pair = found.map(|found| [speed_km_h, self.known_km_h[found.speed]]);
             moved.extend(pair.filter(|pair| !moved.contains(pair)));
         }
         let pair = |[own, models]: &[f64; 2]| {
@@ -107,10 +131,16 @@ impl ModelSpeeds {
     pub(crate) fn of_pass_of(
         &self,
         recording: &Recording,
-        speed_km_h: f64,
+        pass: &Pass,
     ) -> Result<PassSpeed, Error> {
-        self.of_pass(speed_km_h).ok_or_else(|| unknown(recording, speed_km_h, &self.known_km_h))
+        let unknown = || unknown(recording, pass.speed_km_h, &self.known_km_h);
+        self.of_pass(self.speed_of(pass)).ok_or_else(unknown)
     }
+}
+
+/// Whether the positions of a pass give another speed than stated.
+fn is_misstated(pass: &Pass) -> bool {
+    (pass.mean_speed_km_h() / pass.speed_km_h - 1.0).abs() > SPEED_TOLERANCE
 }
 
 /// Checks that models for the `known` speeds in km/h, ascending, can evaluate a pass of the recording.
@@ -177,6 +207,29 @@ mod tests {
         for (speed_km_h, speed) in [(80.4, 0), (81.0, 1), (81.4, 1), (82.0, 2)] {
             assert_eq!(speeds.of_pass(speed_km_h).map(|found| found.speed), Some(speed));
         }
+    }
+
+    #[test]
+    fn a_pass_with_another_speed_than_stated_is_evaluated_at_its_own() {
+        let mut library = testing::library();
+        library.speeds_km_h = vec![10.0, 13.0];
+        let speeds = ModelSpeeds::of(&library);
+        let mut recording = testing::recording(3.0, &[13.0]);
+        assert_eq!(speeds.notes(&recording), [""; 0]);
+        for place in &mut recording.passes[0].position_m {
+            *place *= 0.8;
+        }
+        let taken = speeds.of_pass_of(&recording, &recording.passes[0]).unwrap();
+        assert_eq!(taken, speeds.of_pass(10.4).unwrap());
+        let notes = speeds.notes(&recording);
+        assert!(notes[0].contains("states 13 km/h, but the positions give 10.4 km/h"), "{notes:?}");
+        // No model is for 20 km/h: the stated speed counts, with the note.
+        for place in &mut recording.passes[0].position_m {
+            *place *= 2.0;
+        }
+        let taken = speeds.of_pass_of(&recording, &recording.passes[0]).unwrap();
+        assert_eq!(taken, speeds.of_pass(13.0).unwrap());
+        assert!(speeds.notes(&recording)[0].contains("evaluated as one at 13.0 km/h"));
     }
 
     #[test]

@@ -51,7 +51,7 @@ pub fn features(
     let speed_of_pass = recording
         .passes
         .iter()
-        .map(|pass| speeds.of_pass_of(recording, pass.speed_km_h))
+        .map(|pass| speeds.of_pass_of(recording, pass))
         .collect::<Result<Vec<_>, _>>()?;
     (0..recording.sleepers.len())
         .into_par_iter()

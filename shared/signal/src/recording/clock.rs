@@ -8,6 +8,8 @@ pub const STEP_TOLERANCE: f64 = 0.5;
 const JITTER_MAX: f64 = 1.0;
 /// Sample intervals from which on steps of the clock are coarse: a repeated row makes steps of one.
 const COARSE_MIN: f64 = 1.1;
+/// Largest deviation of even times from a constant rate, as a share of the duration.
+const RATE_CHANGE: f64 = 1e-3;
 /// Relative accuracy of a rate from times that advance evenly.
 const ACCURACY: f64 = 1e-6;
 
@@ -37,15 +39,18 @@ impl SampleClock {
     /// Determines the timing of `times` in s. There must be at least two times.
     ///
     /// # Errors
-    /// [`Fault::UnevenTime`] if samples are missing, repeated or out of order.
+    /// [`Fault::UnevenTime`] if samples are missing, repeated or out of order, or if their rate changes.
     pub(super) fn of(times: &[f64]) -> Result<Self, Fault> {
         let last = times.len() - 1;
         let mean = (times[last] - times[0]) / last as f64;
-        let Some(fault) = uneven_step(times, mean) else {
-            let rate_hz = 1.0 / mean;
-            return Ok(Self { rate_hz, uncertainty: ACCURACY, stamps: Stamps::Even });
-        };
-        coarse(times, mean).or_else(|| jitter(times, mean)).ok_or(fault)
+        if let Some(fault) = uneven_step(times, mean) {
+            return coarse(times, mean).or_else(|| jitter(times, mean)).ok_or(fault);
+        }
+        let (row, off_s) = farthest(times, 0, mean);
+        if off_s > mean.max(RATE_CHANGE * (times[last] - times[0])) {
+            return Err(changing_rate(times, row, mean));
+        }
+        Ok(Self { rate_hz: 1.0 / mean, uncertainty: ACCURACY, stamps: Stamps::Even })
     }
 
     /// The rate with as few digits as its uncertainty allows, in Hz: clocks have round rates.
@@ -59,6 +64,16 @@ impl SampleClock {
     }
 }
 
+/// The error of times whose rate changes at a row: of its two steps the one that differs most from the mean.
+fn changing_rate(times: &[f64], row: usize, mean: f64) -> Fault {
+    let around = [row, row + 1].into_iter().filter(|row| (1..times.len()).contains(row));
+    let steps = around.map(|row| (row, times[row] - times[row - 1]));
+    let other = |(_, step): &(usize, f64)| (step - mean).abs();
+    let (row, step) = steps.max_by(|a, b| other(a).total_cmp(&other(b))).unwrap_or((row, mean));
+    let alternative = " or where the rate changes, or resample it to one rate";
+    Fault::UnevenTime { row: row + 1, step, expected: mean, alternative }
+}
+
 /// Times that are constant and then advance by whole steps of a clock.
 fn coarse(times: &[f64], mean: f64) -> Option<SampleClock> {
     let changes: Vec<usize> = (1..times.len()).filter(|&i| times[i] != times[i - 1]).collect();
@@ -70,7 +85,7 @@ fn coarse(times: &[f64], mean: f64) -> Option<SampleClock> {
     let (first, last) = (changes[0], changes[changes.len() - 1]);
     let interval = (times[last] - times[first]) / (last - first) as f64;
     let whole = |step: f64| (step / step_s - (step / step_s).round()).abs() < 0.1;
-    let off = farthest(times, first, interval);
+    let (_, off) = farthest(times, first, interval);
     if !(steps().all(whole) && off <= step_s + interval) {
         return None;
     }
@@ -80,7 +95,7 @@ fn coarse(times: &[f64], mean: f64) -> Option<SampleClock> {
 
 /// Time stamps with jitter about even times.
 fn jitter(times: &[f64], mean: f64) -> Option<SampleClock> {
-    let off = farthest(times, 0, mean);
+    let (_, off) = farthest(times, 0, mean);
     let advances = times.windows(2).all(|pair| pair[1] > pair[0]);
     let uncertainty = 2.0 * off / (mean * (times.len() - 1) as f64);
     (advances && off <= JITTER_MAX * mean).then_some(SampleClock {
@@ -90,12 +105,13 @@ fn jitter(times: &[f64], mean: f64) -> Option<SampleClock> {
     })
 }
 
-/// The largest deviation in s from times that are even from row `first` on.
-fn farthest(times: &[f64], first: usize, interval: f64) -> f64 {
+/// The row with the largest deviation from times that are even from row `first` on, and this deviation in s.
+fn farthest(times: &[f64], first: usize, interval: f64) -> (usize, f64) {
     let off = |(row, time): (usize, &f64)| {
-        (time - times[first] - (row as f64 - first as f64) * interval).abs()
+        (row, (time - times[first] - (row as f64 - first as f64) * interval).abs())
     };
-    times.iter().enumerate().map(off).fold(0.0, f64::max)
+    let all = times.iter().enumerate().map(off);
+    all.fold((0, 0.0), |farthest, it| if it.1 > farthest.1 { it } else { farthest })
 }
 
 /// The first step that differs from the others by more than rounding.
@@ -146,6 +162,18 @@ mod tests {
         let clock = SampleClock::of(&times(tremble)).unwrap();
         assert!(matches!(clock.stamps, Stamps::Jitter(_)), "{clock:?}");
         assert!((clock.round_rate_hz() / RATE_HZ - 1.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_rate_that_changes_is_refused_at_the_row_of_the_change() {
+        let half = 20_000.0 / RATE_HZ;
+        let changed = times(|time| if time <= half { time } else { half + 1.4 * (time - half) });
+        let fault = SampleClock::of(&changed).unwrap_err();
+        let Fault::UnevenTime { row: 20_002, .. } = fault else { panic!("{fault:?}") };
+        assert!(fault.to_string().contains("resample it to one rate"), "{fault}");
+        // A recorder whose quartz drifts by some 1e-5.
+        let drifting = times(|time| time + 1e-5 * time * time);
+        assert_eq!(SampleClock::of(&drifting).unwrap().stamps, Stamps::Even);
     }
 
     #[test]

@@ -61,6 +61,15 @@ pub struct Pass {
     pub contact_loss_share: Option<f64>,
 }
 
+impl Pass {
+    /// Mean speed in km/h, from the positions.
+    pub fn mean_speed_km_h(&self) -> f64 {
+        let last = self.position_m.len() - 1;
+        let way_m = self.position_m[last] - self.position_m[0];
+        3.6 * way_m / last as f64 * self.signal.sample_rate_hz()
+    }
+}
+
 impl Recording {
     /// Reads and checks the recording in the folder `path`. All its passes are over one rail.
     ///
