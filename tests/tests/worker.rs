@@ -5,7 +5,7 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::time::Duration;
 use system_tests::{Answer, COARSE_MODEL, Process, free_port, run, until};
 
@@ -86,4 +86,32 @@ fn a_run_on_one_machine_takes_results_of_nobody_else_there() {
     let answer = worker(&["--coordinator", &address, "--give-up-after", "5"]);
     assert_eq!(answer.code, Some(2), "{}", answer.err);
     assert!(answer.err.contains("the token is missing"), "{}", answer.err);
+}
+
+#[test]
+fn a_log_that_nobody_takes_stops_neither_coordinator_nor_worker_nor_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let campaign = format!("name = \"unheard\"\ncases = 16\n{COARSE_MODEL}");
+    fs::write(folder.path().join("campaign.toml"), campaign).unwrap();
+    let unheard = |program: &str, arguments: &[&str]| {
+        // Every write to this device fails.
+        let full = fs::File::options().write(true).open("/dev/full").unwrap();
+        let mut command = Command::new(program);
+        command.current_dir(folder.path()).args(arguments).env("RUST_LOG", "info");
+        command.stdout(Stdio::null()).stderr(full).spawn().unwrap()
+    };
+    let address = format!("127.0.0.1:{}", free_port());
+    let arguments = ["--library", "sqlite:library.sqlite", "--campaign", "campaign.toml"];
+    let listen = ["coordinator", "--exit-when-done", "--listen", &address];
+    let mut coordinator = unheard(PROGRAM, &[&listen[..], &arguments].concat());
+    let url = format!("http://{address}");
+    let mut worker =
+        unheard(WORKER, &["--cores", "1", "--coordinator", &url, "--give-up-after", "1"]);
+    until("the campaign is done", LONG, || coordinator.try_wait().unwrap().is_some());
+    assert_eq!(coordinator.wait().unwrap().code(), Some(0));
+    until("the worker ends", LONG, || worker.try_wait().unwrap().is_some());
+    let run = ["run", "campaign.toml", "--no-train", "--cores", "1"];
+    let mut run = unheard(PROGRAM, &run);
+    until("the run ends", LONG, || run.try_wait().unwrap().is_some());
+    assert_eq!(run.wait().unwrap().code(), Some(0));
 }

@@ -13,7 +13,7 @@ pub enum LogFormat {
     Json,
 }
 
-/// Writes log events that pass the filter to standard error.
+/// Writes log events that pass the filter to standard error. Events that cannot be written are lost.
 ///
 /// # Panics
 /// If logging was already set up in this process.
@@ -23,6 +23,8 @@ pub fn log_to_stderr(format: LogFormat, filter: EnvFilter) {
     let log = tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_ansi(colours)
+        // The report of such an error would go to standard error as well, and panic.
+        .log_internal_errors(false)
         .with_writer(std::io::stderr);
     match format {
         LogFormat::Text => log.init(),
