@@ -43,6 +43,7 @@ mod data;
 mod digest;
 mod engine;
 mod error;
+mod error_class;
 mod error_code;
 mod lease;
 mod library;

@@ -1,7 +1,16 @@
 //! Quarantine of workers. A worker in quarantine gets no cases.
 
-use crate::engine::{Connection, Write, sql};
+use crate::engine::{Connection, Text, Write, sql};
 use crate::{Library, LibraryError, WorkerState, result};
+
+/// Number of a campaign's cases with flagged results. It reads all results of the campaign.
+const FLAGGED: Text = Text::Each {
+    sqlite: "
+        select count(distinct sobol_index) as cases from result
+        where campaign_id = $1 and flagged is not null",
+    postgres: "
+        select count(*) as cases from case_result where campaign_id = $1 and flagged is not null",
+};
 
 impl Library {
     /// Puts a worker into quarantine. The worker gets no more cases, and its results are flagged with
@@ -12,6 +21,15 @@ impl Library {
     /// Returns [`LibraryError::UnknownWorker`], or an error if the library cannot be written.
     pub async fn flag_worker(&self, worker: &str, reason: &str) -> Result<u64, LibraryError> {
         self.write(Flag { worker: worker.to_owned(), reason: reason.to_owned() }).await
+    }
+
+    /// Number of a campaign's cases with flagged results. [`Library::training_set`] refuses such a campaign.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be read.
+    pub async fn flagged(&self, campaign: &str) -> Result<u32, LibraryError> {
+        let row = self.readers().row(sql(FLAGGED).bind(campaign)).await?;
+        row.map_or(Ok(0), |row| row.get_u32("cases"))
     }
 
     /// Releases a worker from quarantine. Its flagged results stay flagged.

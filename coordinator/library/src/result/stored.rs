@@ -20,6 +20,8 @@ pub(crate) struct StoredCase {
     checksum: Option<String>,
     /// Version of the physics that computed the results.
     pub(crate) model_hash: String,
+    /// Reason of the flag, if the results are flagged.
+    pub(super) flagged: Option<String>,
 }
 
 /// Result of comparing stored data with the checksum of their worker.
@@ -37,11 +39,14 @@ impl StoredCase {
     fn of(row: &Row) -> Result<Self, LibraryError> {
         let (case, passes) = (case_of(row)?, vec![pass_of(row)?]);
         let (checksum, model_hash) = (row.get("checksum")?, row.get("model_hash")?);
-        Ok(Self { case, passes, checksum, model_hash })
+        Ok(Self { case, passes, checksum, model_hash, flagged: row.get("flagged")? })
     }
 
     fn add(&mut self, row: &Row) -> Result<(), LibraryError> {
         self.passes.push(pass_of(row)?);
+        if self.flagged.is_none() {
+            self.flagged = row.get("flagged")?;
+        }
         // One pass of another checksum speaks against all.
         if row.get::<Option<String>>("checksum")? != self.checksum {
             self.checksum = Some(String::new());

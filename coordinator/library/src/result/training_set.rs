@@ -14,7 +14,7 @@ impl Library {
     ///
     /// # Errors
     /// Returns [`LibraryError`] if the library cannot be read, a case lacks a speed, its results do not match
-    /// their checksum, or several models have computed the results.
+    /// their checksum or are flagged, or several models have computed the results.
     pub async fn training_set(
         &self,
         campaign: &str,
@@ -25,12 +25,18 @@ impl Library {
         let mut model = OneModel::of(campaign);
         let complete = |case: StoredCase| {
             model.check(&case)?;
+            refuse_flagged(campaign, &case)?;
             digest.add(&case);
             complete(case, speeds).map(&mut take)
         };
         self.stored_cases(campaign, complete).await?;
         Ok(digest.finish())
     }
+}
+
+fn refuse_flagged(campaign: &str, case: &StoredCase) -> Result<(), LibraryError> {
+    let Some(reason) = case.flagged.clone() else { return Ok(()) };
+    Err(LibraryError::Flagged { campaign: campaign.to_owned(), index: case.case.index, reason })
 }
 
 fn complete(case: StoredCase, speeds: usize) -> Result<LibraryEntry, LibraryError> {

@@ -149,6 +149,25 @@ on_both_databases! {
         assert_eq!(library.retry(CAMPAIGN, Retry::Flagged).await.unwrap(), 1);
     }
 
+    async fn flagged_results_are_counted_found_and_not_trained_on(home: &Home) {
+        let library = home.library(3).await;
+        library.register_worker(registration("bad", 0)).await.unwrap();
+        work_audited(&library, "good", 1).await;
+        work_audited(&library, "bad", 2).await;
+        assert_eq!(library.flagged(CAMPAIGN).await.unwrap(), 0);
+        library.training_set(CAMPAIGN, drop).await.unwrap();
+        library.flag_worker("bad", "differs by 3 dB").await.unwrap();
+        assert_eq!(library.flagged(CAMPAIGN).await.unwrap(), 2);
+        let error = library.training_set(CAMPAIGN, drop).await.unwrap_err();
+        assert!(error.is_wrong_input(), "{error:?}");
+        for part in ["case 1", "differs by 3 dB", "campaign retry test-000000000000 --flagged"] {
+            assert!(error.to_string().contains(part), "{part} is not in {error}");
+        }
+        let findings = library.verify(|| ()).await.unwrap().findings;
+        let found = findings.iter().find(|it| it.what.contains("retry --flagged"));
+        assert_eq!(found.map(|it| (it.count, it.first_index)), Some((2, Some(1))));
+    }
+
     async fn flagged_results_are_computed_again_when_asked_for(home: &Home) {
         let library = home.library(3).await;
         library.register_worker(registration("bad", 0)).await.unwrap();
@@ -158,6 +177,7 @@ on_both_databases! {
         assert_eq!(library.flag_worker("bad", "differs by 3 dB").await.unwrap(), 4);
         assert_eq!(library.worker("bad").await.unwrap().unwrap().state, WorkerState::Quarantined);
         assert_eq!(library.retry(CAMPAIGN, Retry::Flagged).await.unwrap(), 2);
+        assert_eq!(library.flagged(CAMPAIGN).await.unwrap(), 0);
         let state = library.case(CAMPAIGN, 0).await.unwrap().unwrap().state;
         assert_eq!(state, State::Waiting);
         assert_eq!(library.audits(CAMPAIGN).await.unwrap().open, 1);

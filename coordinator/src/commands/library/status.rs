@@ -16,6 +16,7 @@ struct Counts {
     waiting: u32,
     leased: u32,
     failed: u32,
+    flagged: u32,
     speeds_km_h: Vec<f64>,
     contact_lost: u32,
     contact_loss_share_max: f64,
@@ -51,7 +52,14 @@ impl Counts {
         let lost =
             ContactLoss { cases: self.contact_lost, largest_share: self.contact_loss_share_max };
         let contact = format!("\n  {}", contact_sentence(lost, *finished));
-        counts + &contact + &failures.collect::<String>()
+        let flagged = match self.flagged {
+            0 => String::new(),
+            flagged => format!(
+                "\n  {flagged} cases have results of a worker that computed wrong results: `tracktwin campaign \
+                     retry --flagged` deletes them, and `tracktwin run` or a coordinator computes them again"
+            ),
+        };
+        counts + &contact + &flagged + &failures.collect::<String>()
     }
 }
 
@@ -69,6 +77,7 @@ async fn counts(library: &Library, campaign: CampaignRecord) -> Result<Counts, S
         waiting: status.waiting,
         leased: status.leased,
         failed: status.failed,
+        flagged: library.flagged(&campaign.id).await?,
         speeds_km_h: campaign.speeds_km_h,
         contact_lost: lost.cases,
         contact_loss_share_max: lost.largest_share,

@@ -7,7 +7,7 @@ use crate::{CampaignRecord, LibraryError};
 use tokio_stream::StreamExt;
 
 /// Statements that find the indices of cases with a fault; `$1` is the campaign.
-const FAULTS: [(&str, Text); 8] = [
+const FAULTS: [(&str, Text); 9] = [
     (
         "finished cases without a result at every speed",
         Text::Each {
@@ -52,6 +52,12 @@ const FAULTS: [(&str, Text); 8] = [
         where campaign_id = $1 and model_hash <> (
             select model_hash from result where campaign_id = $1
             order by sobol_index, speed_km_h limit 1)",
+        ),
+    ),
+    (
+        "results of a worker that computed wrong results (flagged; `tracktwin campaign retry --flagged`)",
+        Text::same(
+            "select distinct sobol_index from result where campaign_id = $1 and flagged is not null",
         ),
     ),
     (
