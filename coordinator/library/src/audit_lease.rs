@@ -21,7 +21,18 @@ const LEASED: &str = "
     join campaign_case using (campaign_id, sobol_index)
     where campaign_id = $1 and sobol_index = $2 and auditor = $3 and audit.state = 'leased'";
 
+/// One open audit of any campaign.
+const OPEN: &str = "select sobol_index from audit where state in ('waiting', 'leased') limit 1";
+
 impl Library {
+    /// Whether any campaign has an audit that is not completed.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be read.
+    pub async fn has_open_audits(&self) -> Result<bool, LibraryError> {
+        self.readers().row(sql(OPEN)).await.map(|row| row.is_some())
+    }
+
     /// Extends the leases of audits: they end after `lease_ms`. Audits that the auditor has lost are ignored.
     ///
     /// # Errors

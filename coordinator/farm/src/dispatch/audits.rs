@@ -47,7 +47,8 @@ const DB_PER_LN: f64 = 10.0 * std::f64::consts::LOG10_E;
 /// Number of cases of an audit lease: one group.
 const CASES: u32 = tracktwin_worker::agent::GROUP as u32;
 
-/// Minimum pause before the next search, after a search found no case to audit.
+/// Minimum pause before the next search of a worker, after a search found no case that it could audit; of all
+/// workers, if there was no open audit at all.
 const PAUSE: Duration = Duration::from_secs(2);
 
 /// Leases audits and compares their results.
@@ -58,7 +59,27 @@ pub(crate) struct Audits {
     lease_ms: i64,
     /// Number of failed simulations of open audits, by campaign and index.
     failures: Mutex<HashMap<(String, u32), u32>>,
-    next: Mutex<Option<Instant>>,
+    pauses: Mutex<Pauses>,
+}
+
+/// Times before which no audits are searched for.
+#[derive(Default)]
+struct Pauses {
+    of_all: Option<Instant>,
+    of_worker: HashMap<String, Instant>,
+}
+
+impl Pauses {
+    /// Whether a search for a worker is due. If it is, the next one is due after [`PAUSE`].
+    fn is_due(&mut self, worker: &str, now: Instant) -> bool {
+        let is_over = |until: Option<&Instant>| until.is_none_or(|until| *until <= now);
+        if !is_over(self.of_all.as_ref()) || !is_over(self.of_worker.get(worker)) {
+            return false;
+        }
+        self.of_worker.retain(|_, until| *until > now);
+        self.of_worker.insert(worker.to_owned(), now + PAUSE);
+        true
+    }
 }
 
 impl Audits {
@@ -70,7 +91,7 @@ impl Audits {
             prepare: *prepare,
             lease_ms: i64::try_from(timing.lease.as_millis()).unwrap_or(i64::MAX),
             failures: Mutex::default(),
-            next: Mutex::default(),
+            pauses: Mutex::default(),
         }
     }
 
@@ -81,7 +102,7 @@ impl Audits {
         cases_max: u32,
         campaigns: &Campaigns,
     ) -> Result<Option<CaseLease>, LibraryError> {
-        if self.share <= 0.0 || !self.is_time() {
+        if self.share <= 0.0 || !self.pauses.lock().is_due(worker, Instant::now()) {
             return Ok(None);
         }
         let cases_max = cases_max.min(CASES);
@@ -94,8 +115,11 @@ impl Audits {
                 continue;
             }
             let cases = sample.into_iter().map(|it| LeasedCase { case: it.case, epoch: EPOCH });
-            *self.next.lock() = None;
+            self.pauses.lock().of_worker.remove(worker);
             return Ok(Some(served.lease(cases.collect())));
+        }
+        if !self.library.has_open_audits().await? {
+            self.pauses.lock().of_all = Some(Instant::now() + PAUSE);
         }
         Ok(None)
     }
@@ -116,17 +140,6 @@ impl Audits {
         let count = failures.entry((audit.campaign.clone(), audit.case.index)).or_insert(0);
         *count += 1;
         *count >= FAILURES_MAX
-    }
-
-    /// Whether a search for audits is due. If it is, the next search is due after [`PAUSE`].
-    fn is_time(&self) -> bool {
-        let now = Instant::now();
-        let mut next = self.next.lock();
-        let is_time = next.is_none_or(|next| next <= now);
-        if is_time {
-            *next = Some(now + PAUSE);
-        }
-        is_time
     }
 
     /// Compares the result of an auditing worker with the stored result, and returns the outcome; `None` if
@@ -248,6 +261,17 @@ fn difference(stored: &[Features], found: &Outcome) -> f64 {
 mod tests {
     use super::*;
     use tracktwin_experiment::PassFeatures;
+
+    #[test]
+    fn a_worker_that_finds_nothing_pauses_and_the_others_search_on() {
+        let (mut pauses, now) = (Pauses::default(), Instant::now());
+        assert!(pauses.is_due("first", now));
+        assert!(!pauses.is_due("first", now) && pauses.is_due("second", now));
+        assert!(pauses.is_due("first", now + PAUSE));
+        assert_eq!(pauses.of_worker.len(), 1, "what is over is forgotten");
+        pauses.of_all = Some(now + 2 * PAUSE);
+        assert!(!pauses.is_due("third", now + PAUSE) && pauses.is_due("third", now + 2 * PAUSE));
+    }
 
     #[test]
     fn outcomes_differ_by_their_worst_level() {

@@ -124,6 +124,21 @@ async fn what_an_auditor_gives_back_goes_to_the_next_at_once() {
     }
 }
 
+#[tokio::test]
+async fn a_worker_that_can_audit_nothing_keeps_nobody_from_auditing() {
+    let coordinator = serving(1.0).await;
+    let mut client = registered(&coordinator, "first").await;
+    client.register(registration("second", MODEL_HASH)).await.unwrap();
+    let leased = lease(&mut client, "first").await;
+    client.report(report(&leased, "first")).await.unwrap();
+    // There was no audit at all when the first one asked, which is not looked into again for two seconds.
+    tokio::time::sleep(Duration::from_millis(2100)).await;
+    let others = lease(&mut client, "first").await;
+    assert!(others.cases.iter().all(|case| case.epoch > 0), "it does not audit itself");
+    let audits = lease(&mut client, "second").await;
+    assert!(!audits.cases.is_empty() && audits.cases.iter().all(|case| case.epoch == 0));
+}
+
 /// A machine that cannot simulate anything.
 struct Broken;
 
