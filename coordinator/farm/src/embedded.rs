@@ -1,8 +1,11 @@
 //! The farm in one process: a coordinator and a worker that communicate as on a cluster.
 
-use crate::dispatch::{Counts, Dispatch, DispatchError, Scope, Settings, Timing};
+use crate::dispatch::{
+    Counts, Dispatch, DispatchError, LibraryFaults, Scope, Settings, Timing, WorkerCall,
+};
 use crate::security::{Security, random_token};
 use crate::serve::{ServeError, serve};
+use std::collections::HashMap;
 use std::net::Ipv4Addr;
 use std::num::NonZeroUsize;
 use std::time::{Duration, Instant};
@@ -19,6 +22,9 @@ const LOOK_EVERY: Duration = Duration::from_millis(200);
 
 /// Maximum outage of a library, as for a blind trial. A longer outage ends the run.
 const OUTAGE_MAX: Duration = Duration::from_mins(10);
+
+/// An error this long after the last one begins another outage.
+const RESPONDED_AFTER: Duration = Duration::from_mins(1);
 
 /// Errors that end an embedded farm.
 #[derive(Debug, thiserror::Error)]
@@ -115,10 +121,11 @@ pub async fn run_claimed(
     mut progress: impl FnMut(Status),
 ) -> Result<Status, FarmError> {
     let own = agent::Config::new(String::new(), task.cores);
-    let dispatch = dispatch(library, claim, &task, own.holdings.clone()).await?;
+    let faults = LibraryFaults::default();
+    let dispatch = dispatch(library, claim, &task, own.holdings.clone(), faults.clone()).await?;
     let config = agent::Config { prepare: task.prepare, ..own };
     let mut farm = Running::begin(dispatch, config, &shutdown).await?;
-    let watched = farm.watch(library, &task, &shutdown, &mut progress).await;
+    let watched = farm.watch(library, &task, &faults, &shutdown, &mut progress).await;
     if let Err(error @ FarmError::NotRunning { .. }) = watched {
         // The results of what is in work are stored.
         farm.end(None).await?;
@@ -177,27 +184,31 @@ impl Running {
     }
 
     /// Reads the counts until every case is done or `shutdown` is cancelled; then returns `None`. If the
-    /// worker ends earlier, returns the worker's result.
+    /// worker ends earlier, returns the worker's result. `faults` has the outcomes of the worker's calls.
     async fn watch(
         &mut self,
         library: &Library,
         task: &Task<'_>,
+        faults: &LibraryFaults,
         shutdown: &CancellationToken,
         progress: &mut impl FnMut(Status),
     ) -> Result<Option<Ended>, FarmError> {
-        let mut outage = Outage::default();
+        let mut outages = Outages::default();
         loop {
             library.takes_writes()?;
+            for (call, error) in faults.take() {
+                outages.note(Some(call), error)?;
+            }
             match library.status_of(task.campaign, task.cases).await {
                 Ok(status) => {
-                    outage = Outage::default();
+                    outages.note(None, None)?;
                     progress(status);
                     if status.done() == status.total() {
                         return Ok(None);
                     }
                     check_running(library, task.campaign).await?;
                 }
-                Err(error) => outage.waits_for_library(error)?,
+                Err(error) => outages.note(None, Some(error))?,
             }
             if shutdown.is_cancelled() {
                 return Ok(None);
@@ -225,24 +236,49 @@ impl Running {
     }
 }
 
-/// Start of the present outage of the library, if there is one.
+/// Present outages of the library: of a worker's call, or of reading the counts (`None`).
 #[derive(Default)]
-struct Outage(Option<Instant>);
+struct Outages(HashMap<Option<WorkerCall>, Outage>);
 
-impl Outage {
-    /// Returns `Ok` if the library may respond later. The workers keep their results until then.
+#[derive(Clone, Copy)]
+struct Outage {
+    since: Instant,
+    last: Instant,
+}
+
+impl Outages {
+    /// Notes the outcome of a call. Returns `Ok` if the library may respond later. The workers keep their
+    /// results until then.
     ///
     /// # Errors
     /// Returns `error` if waiting does not help, or if the outage is longer than [`OUTAGE_MAX`].
-    fn waits_for_library(&mut self, error: LibraryError) -> Result<(), LibraryError> {
-        if !error.is_temporary() {
+    fn note(
+        &mut self,
+        call: Option<WorkerCall>,
+        error: Option<LibraryError>,
+    ) -> Result<(), LibraryError> {
+        let Some(error) = error else {
+            self.0.remove(&call);
+            return Ok(());
+        };
+        // What is written to a removed file is lost.
+        if !error.is_temporary() || matches!(error, LibraryError::FileGone { .. }) {
             return Err(error);
         }
-        let since = *self.0.get_or_insert_with(|| {
-            tracing::warn!("{error}; waiting for up to {} minutes", OUTAGE_MAX.as_secs() / 60);
-            Instant::now()
-        });
-        if since.elapsed() < OUTAGE_MAX { Ok(()) } else { Err(error) }
+        let now = Instant::now();
+        let known = self.0.get(&call);
+        let since = match known.filter(|it| now.duration_since(it.last) < RESPONDED_AFTER) {
+            Some(outage) => outage.since,
+            None => {
+                if self.0.is_empty() {
+                    let minutes = OUTAGE_MAX.as_secs() / 60;
+                    tracing::warn!("{error}; waiting for up to {minutes} minutes");
+                }
+                now
+            }
+        };
+        self.0.insert(call, Outage { since, last: now });
+        if now.duration_since(since) < OUTAGE_MAX { Ok(()) } else { Err(error) }
     }
 }
 
@@ -252,6 +288,7 @@ async fn dispatch(
     claim: &Claim,
     task: &Task<'_>,
     own: Holdings,
+    faults: LibraryFaults,
 ) -> Result<Dispatch, FarmError> {
     if claim.is_exclusive() {
         // Whoever held these died with the process that served it.
@@ -265,9 +302,50 @@ async fn dispatch(
         // There is no other machine to turn to.
         suspends_failing: false,
         own: Some(own),
+        faults,
         ..Settings::default()
     };
     let dispatch = Dispatch::new(library.clone(), settings, Counts::default());
     dispatch.check(task.campaign).await?;
     Ok(dispatch)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const REPORT: Option<WorkerCall> = Some(WorkerCall::Report);
+
+    /// Outages with one of reports that began and was last noticed at these times before now.
+    fn outages(began: Duration, noticed: Duration) -> Outages {
+        let before = |time| Instant::now().checked_sub(time).unwrap();
+        let outage = Outage { since: before(began), last: before(noticed) };
+        Outages(HashMap::from([(REPORT, outage)]))
+    }
+
+    #[test]
+    fn results_that_cannot_be_stored_end_a_run_after_the_time_limit() {
+        let mut fresh = Outages::default();
+        fresh.note(REPORT, Some(LibraryError::DiskFull)).unwrap();
+        let mut long = outages(OUTAGE_MAX, Duration::from_secs(4));
+        // The counts can be read all the time, and leases be written.
+        long.note(None, None).unwrap();
+        long.note(Some(WorkerCall::Lease), None).unwrap();
+        let error = long.note(REPORT, Some(LibraryError::DiskFull)).unwrap_err();
+        assert!(matches!(error, LibraryError::DiskFull));
+        // Somebody freed space meanwhile, or there was nothing to store for a time.
+        let mut over = outages(OUTAGE_MAX, Duration::from_secs(4));
+        over.note(REPORT, None).unwrap();
+        over.note(REPORT, Some(LibraryError::DiskFull)).unwrap();
+        let mut another = outages(OUTAGE_MAX, 2 * RESPONDED_AFTER);
+        another.note(REPORT, Some(LibraryError::DiskFull)).unwrap();
+    }
+
+    #[test]
+    fn what_waiting_does_not_mend_ends_a_run_at_once() {
+        let gone = LibraryError::FileGone { library: "l".to_owned() };
+        for error in [gone, LibraryError::Closed] {
+            assert!(Outages::default().note(REPORT, Some(error)).is_err());
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! Monitors the campaigns of a coordinator: log messages, and the end when all campaigns are done.
 
+use crate::dispatch::is_news;
 use std::collections::HashMap;
 use std::error::Error;
 use std::time::Duration;
@@ -43,9 +44,10 @@ pub(super) async fn watch(
                     stop.cancel();
                 }
             }
-            Err(error) => {
+            Err(error) if is_news(&error.to_string(), std::time::Instant::now()) => {
                 tracing::error!(error = &error as &dyn Error, "the library does not respond");
             }
+            Err(_) => {}
         }
         tokio::select! {
             () = tokio::time::sleep(LOOK_EVERY) => {}

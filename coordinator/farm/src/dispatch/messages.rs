@@ -1,9 +1,8 @@
 //! Conversion between messages and values of the library.
 
-use std::error::Error;
 use tonic::Status;
 use tracktwin_experiment::{CODE_VERSION, MODEL_HASH};
-use tracktwin_library::{Held, LibraryError, ReportVerdict};
+use tracktwin_library::{Held, ReportVerdict};
 use tracktwin_protocol::{BadMessage, PROTOCOL_VERSION, Registration, farm, held_from_messages};
 
 /// Reason why a worker is incompatible with this coordinator, with the remedy; `None` if it is compatible.
@@ -45,10 +44,4 @@ pub(crate) const fn verdict_message(verdict: ReportVerdict) -> farm::Verdict {
 
 pub(crate) fn malformed(error: &BadMessage) -> Status {
     Status::invalid_argument(error.to_string())
-}
-
-/// Status for a failed library call. The worker repeats the call; the coordinator logs the error.
-pub(crate) fn unavailable(error: &LibraryError) -> Status {
-    tracing::error!(error = error as &dyn Error, "library request failed");
-    Status::unavailable(error.to_string())
 }

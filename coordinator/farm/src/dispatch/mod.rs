@@ -8,16 +8,20 @@ mod breaker;
 mod campaigns;
 mod counts;
 mod lease_sizer;
+mod library_faults;
 mod messages;
 mod policy;
 mod roster;
 mod service;
 mod settings;
 
+pub(crate) use library_faults::is_news;
+
 pub use breaker::Breaker;
 pub use campaigns::DispatchError;
 pub use counts::Counts;
 pub use lease_sizer::LeaseSizer;
+pub use library_faults::{LastOutcome, LibraryFaults, WorkerCall};
 pub use policy::{ATTEMPTS_MAX, FAILURES_MAX, LOSSES_MAX, SUSPECT_AFTER};
 pub use service::Dispatch;
 pub use settings::{Clock, Scope, Settings, Timing};

@@ -1,5 +1,6 @@
 //! Settings of a dispatch.
 
+use super::LibraryFaults;
 use std::sync::Arc;
 use std::time::Duration;
 use tracktwin_experiment::{Prepare, prepare_simulation};
@@ -60,6 +61,8 @@ pub struct Settings {
     /// Cases held by the worker of this process, if there is such a worker. The leases of these cases do
     /// not expire, even if heartbeats are late on a busy machine.
     pub own: Option<Holdings>,
+    /// Last outcomes of the calls that write to the library.
+    pub faults: LibraryFaults,
 }
 
 impl Default for Settings {
@@ -72,6 +75,7 @@ impl Default for Settings {
             prepare: prepare_simulation,
             clock: None,
             own: None,
+            faults: LibraryFaults::default(),
         }
     }
 }

@@ -125,6 +125,25 @@ async fn a_campaign_that_grows_keeps_what_it_has() {
     assert_eq!(library.digest(&id).await.unwrap(), undisturbed(&many).await);
 }
 
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_library_whose_file_is_removed_ends_the_run() {
+    let campaign = Campaign::built_in(Some(2000)).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let library = library(&folder, &campaign).await;
+    let id = campaign.id();
+    let file = folder.path().join("library.sqlite");
+    let remove = |_| {
+        let _ = std::fs::remove_file(&file);
+    };
+    let task = task(&id, campaign.cases);
+    let run = embedded::run_embedded(&library, task, CancellationToken::new(), remove);
+    let ended = tokio::time::timeout(Duration::from_secs(20), run).await.unwrap();
+    let FarmError::Library(error) = ended.unwrap_err() else { panic!("it is the library's fault") };
+    // A reading connection that is opened now finds no file.
+    let gone = matches!(error, LibraryError::FileGone { .. } | LibraryError::NotOpened { .. });
+    assert!(gone, "{error:?}");
+}
+
 /// A simulator that needs three times the lease duration of the tests.
 struct Slow(StandIn);
 

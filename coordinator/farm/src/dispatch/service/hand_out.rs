@@ -2,7 +2,7 @@
 
 use super::{Dispatch, unix_ms};
 use crate::dispatch::campaigns::{DispatchError, Served};
-use crate::dispatch::messages::unavailable;
+use crate::dispatch::library_faults::{WorkerCall, unavailable};
 use crate::dispatch::{ATTEMPTS_MAX, LeaseSizer, SUSPECT_AFTER};
 use std::time::Duration;
 use tokio::time::Instant;
@@ -43,7 +43,8 @@ impl Dispatch {
             attempts_max: ATTEMPTS_MAX,
             alone_after: SUSPECT_AFTER,
         };
-        let leased = self.library.lease(request).await.map_err(|error| unavailable(&error))?;
+        let leased = self.library.lease(request).await;
+        let leased = self.settings.faults.note(WorkerCall::Lease, leased)?;
         let Some(leased) = leased else {
             let mut until = self.nothing_until.lock();
             *until = Some(Instant::now() + NOTHING.min(self.settings.timing.retry));

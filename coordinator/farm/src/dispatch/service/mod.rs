@@ -6,7 +6,8 @@ mod take_in;
 use super::Counts;
 use super::audits::{Audits, LeaseKind};
 use super::campaigns::{Campaigns, DispatchError};
-use super::messages::{held, incompatibility, malformed, unavailable};
+use super::library_faults::{WorkerCall, unavailable};
+use super::messages::{held, incompatibility, malformed};
 use super::roster::{Roster, WorkerEligibility};
 use super::settings::Settings;
 use parking_lot::Mutex;
@@ -73,7 +74,7 @@ impl Dispatch {
     /// Records in the library that a worker is alive, and reads whether it is in quarantine.
     async fn note(&self, worker: &str) -> Result<(), Status> {
         let known = self.library.heartbeat(worker, self.now_unix_ms()).await;
-        if let Some(record) = known.map_err(|error| unavailable(&error))? {
+        if let Some(record) = self.settings.faults.note(WorkerCall::Heartbeat, known)? {
             self.roster.set_quarantine(worker, record.quarantine());
         }
         Ok(())
@@ -106,7 +107,8 @@ impl Farm for Dispatch {
             now_unix_ms,
         };
         let state = self.library.register_worker(registration).await;
-        if state.map_err(|error| unavailable(&error))? == WorkerState::Quarantined {
+        let state = self.settings.faults.note(WorkerCall::Register, state)?;
+        if state == WorkerState::Quarantined {
             let record = self.library.worker(&worker).await.map_err(|error| unavailable(&error))?;
             let reason = record.and_then(library::WorkerRecord::quarantine);
             self.roster.set_quarantine(&worker, reason);
@@ -159,7 +161,7 @@ impl Farm for Dispatch {
         }
         let until = self.now_unix_ms().saturating_add(unix_ms(self.settings.timing.lease));
         let lost = self.library.renew(&campaign_id, &worker, held, until).await;
-        let lost = lost.map_err(|error| unavailable(&error))?;
+        let lost = self.settings.faults.note(WorkerCall::Renew, lost)?;
         self.eligibility(&worker).await?;
         let lost = held_to_messages(lost.into_iter().map(|held| (held.index, held.epoch)));
         Ok(Response::new(farm::RenewResponse { lost }))

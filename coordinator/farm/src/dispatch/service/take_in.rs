@@ -4,7 +4,8 @@ use super::Dispatch;
 use crate::dispatch::ATTEMPTS_MAX;
 use crate::dispatch::audits::{AuditOutcome, LeaseKind};
 use crate::dispatch::campaigns::Served;
-use crate::dispatch::messages::{unavailable, verdict_message};
+use crate::dispatch::library_faults::{WorkerCall, unavailable};
+use crate::dispatch::messages::verdict_message;
 use crate::dispatch::roster::WorkerEligibility;
 use std::sync::Arc;
 use tonic::Status;
@@ -78,10 +79,10 @@ impl Dispatch {
             attempts_max: ATTEMPTS_MAX,
             audit_share: self.settings.audit_share,
         };
-        let verdicts = self.library.report(report).await.map_err(|error| {
+        let verdicts = self.library.report(report).await.inspect_err(|error| {
             step.fail(&error.to_string());
-            unavailable(&error)
-        })?;
+        });
+        let verdicts = self.settings.faults.note(WorkerCall::Report, verdicts)?;
         // Repeated reports count once.
         let stored =
             ended.iter().zip(&verdicts).filter(|(_, it)| matches!(it, ReportVerdict::Stored));
