@@ -6,6 +6,7 @@
 mod attest;
 mod cell;
 mod decode;
+mod merge;
 mod query;
 mod question;
 mod read;

@@ -1,6 +1,6 @@
 //! Import of rows from another library.
 
-use super::{Cell, Column, Table, decode};
+use super::{Cell, Column, Table, decode, merge};
 use crate::case::case_in;
 use crate::engine::{Connection, Dialect, Statement, Text, Write, sql};
 use crate::result::{Attested, Gathering};
@@ -60,7 +60,8 @@ const PASSES: Text = Text::Each {
 };
 
 impl Library {
-    /// Adds rows that do not exist yet. Returns the number of added rows.
+    /// Adds rows that do not exist yet, and replaces workers, progress and audits by later states of them. Flags
+    /// of existing results are added. Returns the number of added and replaced rows.
     ///
     /// Leases are not copied: a case that is leased in the other library becomes waiting in this one.
     ///
@@ -116,7 +117,12 @@ impl Library {
         let rows: Vec<_> = rows.into_iter().map(|row| without_lease(table, row)).collect();
         self.refuse_other_campaigns(table, &rows).await?;
         refuse_other_parameters(table, &rows)?;
-        let rows = self.without_those_here(table, rows).await?;
+        let rows = if merge::replaces(table) {
+            merge::without_duplicates(table, rows)
+        } else {
+            self.flag_those_here(table, &rows).await?;
+            self.without_those_here(table, rows).await?
+        };
         if rows.is_empty() { Ok(0) } else { self.write(Rows { table, rows }).await }
     }
 
@@ -252,9 +258,8 @@ impl Write for Rows {
             self.finish_complete_cases(connection).await?;
             return rows.first().map_or(Ok(0), |row| row.get_u32("added").map(u64::from));
         }
-        let (table, key) = (self.table.name, self.table.key.join(", "));
-        let insert =
-            format!("insert into {table} ({list}) values {values} on conflict ({key}) do nothing");
+        let (table, on_conflict) = (self.table.name, merge::on_conflict(self.table));
+        let insert = format!("insert into {table} ({list}) values {values} {on_conflict}");
         let added = connection.execute(self.bound(insert)?).await?;
         if table == "result" {
             self.refuse_altered(connection).await?;

@@ -1,5 +1,6 @@
 //! Workers as shared by all coordinators, and their quarantine.
 
+use crate::data::{ask, copy};
 use crate::support::{CAMPAIGN, Home, failed, finished, lease, message, on_both_databases, report};
 use tracktwin_library::{
     AuditCounts, AuditFinding, Library, LibraryError, Registration, Report, ReportVerdict, Retry,
@@ -166,6 +167,34 @@ on_both_databases! {
         let findings = library.verify(|| ()).await.unwrap().findings;
         let found = findings.iter().find(|it| it.what.contains("retry --flagged"));
         assert_eq!(found.map(|it| (it.count, it.first_index)), Some((2, Some(1))));
+    }
+
+    async fn a_continued_copy_has_the_quarantine_the_flags_and_the_counts_that_came_since(home: &Home) {
+        let library = home.library(4).await;
+        for worker in ["bad", "good"] {
+            library.register_worker(registration(worker, 0)).await.unwrap();
+        }
+        work_audited(&library, "bad", 2).await;
+        let home = home.another();
+        let there = Library::open_or_create(&home.url).await.unwrap();
+        assert!(copy(&library, &there).await > 0);
+        work_audited(&library, "good", 1).await;
+        library.audit_sample(CAMPAIGN, "good", 1, 1000).await.unwrap();
+        let differs = AuditFinding { agrees: false, difference_db: 3.0 };
+        let wrong = Some(("bad", "differs by 3 dB"));
+        library.audited(CAMPAIGN, 0, "good", differs, wrong).await.unwrap();
+        copy(&library, &there).await;
+        for worker in ["bad", "good"] {
+            assert_eq!(there.worker(worker).await.unwrap(), library.worker(worker).await.unwrap());
+        }
+        assert_eq!(there.flagged(CAMPAIGN).await.unwrap(), 2);
+        assert_eq!(there.audits(CAMPAIGN).await.unwrap(), library.audits(CAMPAIGN).await.unwrap());
+        let finished = "select sum(finished) as n from progress";
+        assert_eq!(ask(&there, finished).await.rows, ask(&library, finished).await.rows);
+        assert_eq!(copy(&library, &there).await, 0, "nothing came since");
+        // What the target knows later is kept.
+        there.heartbeat("good", i64::MAX / 2).await.unwrap();
+        assert_eq!(copy(&library, &there).await, 0);
     }
 
     async fn flagged_results_are_computed_again_when_asked_for(home: &Home) {

@@ -17,7 +17,8 @@ const ROWS_AT_A_TIME: usize = 1000;
 #[derive(Args)]
 #[command(
     after_help = "Existing rows of the target are kept, so an interrupted copy can be continued, and two \
-    libraries can be merged into a third. At the end the digests are compared; the exit code is 1 if a \
+    libraries can be merged into a third. Workers, progress and audits are brought to the later state, and \
+    flags of wrong results are added. At the end the digests are compared; the exit code is 1 if a \
     campaign differs.\n\n\
     From a damaged library the intact rows are copied. Unreadable rows, and results that do not match \
     their checksum, are left out and listed (exit code 1). `tracktwin run` on the copy simulates them again."
@@ -38,6 +39,7 @@ pub(in crate::commands) struct Arguments {
 #[derive(Default)]
 struct Copied {
     done: u64,
+    /// Rows added or brought up to date.
     added: u64,
     left_out: Vec<String>,
 }
@@ -76,7 +78,9 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
 impl Copied {
     fn print(&self) {
         let Self { done, added, left_out } = self;
-        println_stdout(&format!("{added} of {done} rows copied; the others already existed"));
+        println_stdout(&format!(
+            "{added} of {done} rows copied or brought up to date; the others already existed"
+        ));
         for what in left_out {
             println_stdout(&format!("left out: {what}"));
         }
