@@ -177,7 +177,42 @@ fn a_library_that_is_not_there_or_something_else_is_refused() {
         .unwrap();
     assert_refused(&status(&url("text.sqlite")), &["text.sqlite", "not a tracktwin library"]);
     assert_refused(&status("library.sqlite"), &["sqlite:PATH"]);
-    assert_eq!(contents(folder.path()), ["text.sqlite"]);
+    assert_refused(&status("sqlite:/dev/null"), &["/dev/null", "not a tracktwin library"]);
+    let name = "n".repeat(300);
+    assert_refused(&status(&url(&name)), &["too long", "shorter"]);
+    let deep =
+        format!("{}/l.sqlite", ["d".repeat(200), "e".repeat(200), "f".repeat(200)].join("/"));
+    fs::create_dir_all(folder.path().join(&deep).parent().unwrap()).unwrap();
+    for url in [url(&name), url(&deep), "sqlite:/dev/null".to_owned()] {
+        let answer = run(PROGRAM, &["coordinator", "--library", &url, "--listen", "127.0.0.1:0"]);
+        assert_refused(
+            &answer,
+            &[if url.contains("null") { "not a tracktwin" } else { "shorter" }],
+        );
+    }
+    assert_eq!(contents(folder.path()), [&"d".repeat(200), "text.sqlite"]);
+}
+
+#[test]
+fn what_a_library_is_not_copied_exported_or_imported_to_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let (file, url) = (path("campaign.toml"), format!("sqlite:{}", path("l.sqlite")));
+    fs::write(&file, "name = \"c\"\nseed = 1\ncases = 8\n").unwrap();
+    run(PROGRAM, &["campaign", "add", &file, "--library", &url]).succeeded();
+    let library = |arguments: &[&str]| run(PROGRAM, &[&["library"], arguments].concat());
+    std::os::unix::fs::symlink(path("l.sqlite"), path("link.sqlite")).unwrap();
+    for same in ["l.sqlite", "./l.sqlite", "link.sqlite"] {
+        let same = format!("sqlite:{}", path(same));
+        let answer = library(&["copy", "--from", &url, "--to", &same]);
+        assert_refused(&answer, &["the same library", "another --to"]);
+    }
+    let tables = path("tables");
+    library(&["export", "--out", &tables, "--format", "csv", "--library", &url]).succeeded();
+    let answer =
+        library(&["import", &tables, "--library", &format!("sqlite:{}", path("new.sqlite"))]);
+    assert_refused(&answer, &["reads Parquet only", "--format parquet"]);
+    assert!(!Path::new(&path("new.sqlite")).exists());
 }
 
 #[test]

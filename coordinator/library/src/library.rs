@@ -92,6 +92,13 @@ impl Library {
         self.opened.target.path()
     }
 
+    /// Whether this library is the file to which another URL leads, by any spelling or link.
+    pub fn is_at(&self, url: &str) -> bool {
+        let other = Target::parse(url).ok();
+        let identity = |target: &Target| target.path().and_then(engine::identity);
+        identity(self.target()).is_some_and(|own| other.as_ref().and_then(identity) == Some(own))
+    }
+
     /// Present time of the library's clock, in ms since 1970. Leases begin and end by this clock.
     ///
     /// With `SQLite` it is the clock of this machine, with PostgreSQL that of the server. Coordinators

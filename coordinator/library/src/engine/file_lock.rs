@@ -15,10 +15,10 @@ use std::path::{Path, PathBuf};
 static FILES: Mutex<BTreeMap<Identity, Locked>> = Mutex::new(BTreeMap::new());
 
 /// Device and inode: identity of a file, independent of links and mounts.
-pub(super) type Identity = [u64; 2];
+pub(crate) type Identity = [u64; 2];
 
 /// Identity of the file at a path; `None` if there is no file.
-pub(super) fn identity(path: &Path) -> Option<Identity> {
+pub(crate) fn identity(path: &Path) -> Option<Identity> {
     std::fs::metadata(path).ok().as_ref().map(identity_of)
 }
 

@@ -26,7 +26,7 @@ mod writer_shards;
 
 pub(crate) use connection::{Connection, Readers};
 pub(crate) use dialect::Dialect;
-pub(crate) use file_lock::FileLock;
+pub(crate) use file_lock::{FileLock, identity};
 pub(crate) use iso::iso_utc;
 pub(crate) use open::{Access, Opened, open, open_or_create};
 pub(crate) use row::Row;

@@ -45,10 +45,10 @@ struct Copied {
 }
 
 pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
-    if arguments.from == arguments.to {
+    let from = Library::open_to_read(&arguments.from).await?;
+    if arguments.from == arguments.to || from.is_at(&arguments.to) {
         return Err(anyhow!("--from and --to are the same library; give another --to")).or_input();
     }
-    let from = Library::open_to_read(&arguments.from).await?;
     let to = open_or_create(&arguments.to).await?;
     let mut copied = copy(&from, &to).await?;
     to.finish_complete_cases().await?;

@@ -37,7 +37,15 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
     // Check before anything is written.
     let files = Table::ALL.iter().map(|table| file(table)).collect::<Result<Vec<_>, _>>()?;
     let missing = Table::ALL.iter().zip(&files).find(|(_, file)| !file.is_file());
-    if let Some((missing, _)) = missing {
+    if let Some((missing, file)) = missing {
+        if file.with_extension("csv").is_file() {
+            return Err(anyhow!(
+                "{}: the tables are CSV, but `library import` reads Parquet only; write them with \
+                 `tracktwin library export --format parquet --out FOLDER`",
+                folder.display()
+            ))
+            .or_input();
+        }
         return Err(anyhow!(
             "{}: {}.parquet is missing; `tracktwin library export --out FOLDER` writes all tables",
             folder.display(),
