@@ -207,6 +207,10 @@ fn what_a_library_is_not_copied_exported_or_imported_to_is_refused() {
         let answer = library(&["copy", "--from", &url, "--to", &same]);
         assert_refused(&answer, &["the same library", "another --to"]);
     }
+    let out = path("training.parquet");
+    let answer = library(&["export", "--out", &out, "--format", "csv", "--library", &url]);
+    assert_refused(&answer, &["--format csv", "training.parquet", "--format out"]);
+    assert!(!Path::new(&out).exists());
     let tables = path("tables");
     library(&["export", "--out", &tables, "--format", "csv", "--library", &url]).succeeded();
     let answer =

@@ -73,6 +73,17 @@ struct Exported {
 pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
     let Arguments { library, out, force, format, json } = arguments;
     let named = Format::of(out).filter(|_| !out.is_dir());
+    if let (Some(named), Some(format)) = (named, *format)
+        && named != format
+    {
+        return Err(anyhow!(
+            "--format {}: --out {} names a {} file; give the same format in both, or leave --format out",
+            format.extension(),
+            out.display(),
+            named.extension()
+        ))
+        .or_input();
+    }
     let format = format.or(named).unwrap_or(Format::Parquet);
     if let (None, Some(extension), false) = (named, out.extension(), out.is_dir()) {
         let extension = extension.display();
