@@ -112,6 +112,19 @@ fn only_what_was_given_up_is_tried_again() {
 }
 
 #[test]
+fn cases_of_a_paused_campaign_are_tried_again_with_the_remedy() {
+    let home = Home::new();
+    home.add().succeeded();
+    assert!(!home.tell(&["retry"]).succeeded().contains("resume"));
+    home.tell(&["pause"]).succeeded();
+    let answer = home.tell(&["retry"]).succeeded();
+    assert!(answer.contains("it is paused: run `tracktwin campaign resume`"), "{answer}");
+    let answer: serde_json::Value =
+        serde_json::from_str(&home.tell(&["retry", "--json"]).succeeded()).unwrap();
+    assert_eq!(answer["state"], "paused");
+}
+
+#[test]
 fn cases_added_and_tried_again_are_counted_in_json() {
     let home = Home::new();
     let tell = |arguments: &[&str]| -> serde_json::Value {

@@ -123,9 +123,7 @@ pub(super) async fn run(action: Action) -> Result<(), Stop> {
             if let Retry::Cases(indices) = &which {
                 refuse_others(&library, &id, indices).await?;
             }
-            let again = library.retry(&id, which).await?;
-            let line = format!("{id}: {again} cases will be simulated again");
-            counted(library, json, &line, &json!({ "campaign": id, "to_simulate": again })).await
+            retry(library, &id, which, json).await
         }
         Action::Priority { named, to } => {
             let (library, id) = named.open().await?;
@@ -160,17 +158,27 @@ async fn add(
     add_cases(&library, &campaign).await?;
     let status = library.status(&id).await?;
     let (cases, left) = (status.total(), status.total() - status.done());
-    let all = library.overview().await?;
-    let state = all.iter().find(|it| it.id == id).map(|it| it.state);
-    let waits = match state {
-        Some(CampaignState::Running) | None => String::new(),
-        Some(state) => {
-            format!("; it is {}: run `tracktwin campaign resume`", state.name())
-        }
-    };
-    let line = format!("{id}: {cases} cases, {left} of them to be simulated{waits}");
-    let state = state.map(CampaignState::name);
-    let counts = json!({ "campaign": id, "state": state, "cases": cases, "to_simulate": left });
+    let state = library.campaign_state(&id).await?;
+    let line = format!("{id}: {cases} cases, {left} of them to be simulated{}", waits(state));
+    let counts =
+        json!({ "campaign": id, "state": state.name(), "cases": cases, "to_simulate": left });
+    counted(library, json, &line, &counts).await
+}
+
+/// What the user must do before the cases of a campaign in this state are simulated; empty if it is running.
+fn waits(state: CampaignState) -> String {
+    match state {
+        CampaignState::Running => String::new(),
+        state => format!("; it is {}: run `tracktwin campaign resume`", state.name()),
+    }
+}
+
+/// Sets cases to waiting.
+async fn retry(library: Library, id: &str, which: Retry, json: bool) -> Result<(), Stop> {
+    let again = library.retry(id, which).await?;
+    let state = library.campaign_state(id).await?;
+    let line = format!("{id}: {again} cases will be simulated again{}", waits(state));
+    let counts = json!({ "campaign": id, "state": state.name(), "to_simulate": again });
     counted(library, json, &line, &counts).await
 }
 
