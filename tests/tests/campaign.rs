@@ -125,6 +125,23 @@ fn cases_of_a_paused_campaign_are_tried_again_with_the_remedy() {
 }
 
 #[test]
+fn a_run_and_a_coordinator_tell_that_they_add_cases() {
+    let home = Home::new();
+    let (file, out) = (home.path("coarse.toml"), home.path("out"));
+    let arguments = ["run", &file, "--no-train", "--out", &out, "--library", &home.library()];
+    let told = |cases: &str| run(PROGRAM, &[&arguments[..], &["--cases", cases]].concat()).err;
+    assert!(told("8").contains("adding cases: done"));
+    assert!(!told("8").contains("adding cases"), "there is nothing to add");
+    let listen = format!("127.0.0.1:{}", system_tests::free_port());
+    home.tell(&["pause"]).succeeded();
+    let arguments = ["coordinator", "--exit-when-done", "--listen", &listen, "--campaign", &file];
+    let answer = run(PROGRAM, &[&arguments[..], &["--library", &home.library()]].concat());
+    assert!(answer.err.contains("adding cases"), "{}", answer.err);
+    assert!(answer.err.contains("cases=60 total=60"), "{}", answer.err);
+    assert_eq!(home.cases(), 60);
+}
+
+#[test]
 fn cases_added_and_tried_again_are_counted_in_json() {
     let home = Home::new();
     let tell = |arguments: &[&str]| -> serde_json::Value {

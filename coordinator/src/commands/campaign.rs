@@ -10,6 +10,7 @@ use anyhow::{Context, anyhow};
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
 use std::path::PathBuf;
+use tokio_util::sync::CancellationToken;
 use tracktwin_experiment::MODEL_HASH;
 use tracktwin_farm::campaign::Campaign;
 use tracktwin_library::{CampaignState, Library, Retry, State};
@@ -155,7 +156,9 @@ async fn add(
     if let Some(priority) = priority {
         library.set_priority(&id, priority).await?;
     }
-    add_cases(&library, &campaign).await?;
+    let shutdown = stop_on_signal("stopping")?;
+    let _nothing_left_to_wind_up = shutdown.clone().drop_guard();
+    add_cases(&library, &campaign, &shutdown).await?;
     let status = library.status(&id).await?;
     let (cases, left) = (status.total(), status.total() - status.done());
     let state = library.campaign_state(&id).await?;
@@ -182,16 +185,21 @@ async fn retry(library: Library, id: &str, which: Retry, json: bool) -> Result<(
     counted(library, json, &line, &counts).await
 }
 
-/// Adds cases with a progress bar. If the user interrupts it, the error states the number of added cases.
-async fn add_cases(library: &Library, campaign: &Campaign) -> Result<(), Stop> {
-    let shutdown = stop_on_signal("stopping")?;
-    let _nothing_left_to_wind_up = shutdown.clone().drop_guard();
-    let (mut stored, total) = (0, campaign.cases);
-    let mut progress = None::<Progress>;
+/// Adds cases until `shutdown` is cancelled; then the error states the number of added cases. This number and the
+/// total are passed to `tell` while there is something to add.
+pub(super) async fn add_cases_told(
+    library: &Library,
+    campaign: &Campaign,
+    shutdown: &CancellationToken,
+    mut tell: impl FnMut(u32, u32),
+) -> Result<(), Stop> {
+    let (mut stored, total, mut adds) = (0, campaign.cases, false);
     let added = tracktwin_farm::campaign::add_cases(library, campaign, |now| {
         stored = now;
-        let begin = || Progress::begin("adding cases", now.into(), total.into());
-        progress.get_or_insert_with(begin).at(now.into(), "");
+        adds |= now < total;
+        if adds {
+            tell(now, total);
+        }
         !shutdown.is_cancelled()
     });
     let added = added.await;
@@ -203,6 +211,21 @@ async fn add_cases(library: &Library, campaign: &Campaign) -> Result<(), Stop> {
     if stored < total {
         return Err(anyhow!(so_far()).into());
     }
+    Ok(())
+}
+
+/// As [`add_cases_told`], with a progress bar.
+pub(super) async fn add_cases(
+    library: &Library,
+    campaign: &Campaign,
+    shutdown: &CancellationToken,
+) -> Result<(), Stop> {
+    let mut progress = None::<Progress>;
+    let tell = |now: u32, total: u32| {
+        let begin = || Progress::begin("adding cases", now.into(), total.into());
+        progress.get_or_insert_with(begin).at(now.into(), "");
+    };
+    add_cases_told(library, campaign, shutdown, tell).await?;
     progress.into_iter().for_each(Progress::end);
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! `tracktwin coordinator`: serves campaigns to workers on other machines.
 
+use super::campaign::add_cases_told;
 use super::files::read;
 use super::library_url::LibraryUrl;
 use super::numbers::count;
@@ -9,8 +10,9 @@ use anyhow::Context;
 use clap::Args;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio::net::TcpListener;
+use tokio_util::sync::CancellationToken;
 use tracktwin_farm::campaign::Campaign;
 use tracktwin_farm::coordinator::{Coordinator, CoordinatorError};
 use tracktwin_farm::dispatch::{Settings, Timing};
@@ -19,6 +21,9 @@ use tracktwin_library::Library;
 use tracktwin_parameters::quantity::CASES;
 use tracktwin_traces::Export;
 use tracktwin_worker::Token;
+
+/// Interval of the log lines while cases are added.
+const TELL_EVERY: Duration = Duration::from_secs(10);
 
 /// Arguments of `coordinator`.
 #[derive(Args)]
@@ -101,7 +106,8 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let library = arguments.library.open_or_create().await?;
     // A coordinator that cannot serve the library must not add campaigns to it.
     let claim = tracktwin_farm::embedded::claim(&library).await?;
-    add(&library, &campaigns).await?;
+    let stop = stop_on_signal("stopping: running calls are finished, leases are kept")?;
+    add(&library, &campaigns, &stop).await?;
     let coordinator = Coordinator {
         library: library.clone(),
         claim,
@@ -115,7 +121,6 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         },
         exit_when_done: arguments.exit_when_done,
     };
-    let stop = stop_on_signal("stopping: running calls are finished, leases are kept")?;
     let ended = coordinator.run(stop).await;
     library.close().await;
     ended.map_err(|error| match error {
@@ -126,16 +131,38 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
 }
 
 /// Adds all campaigns; if one of them is refused, adds none.
-async fn add(library: &Library, campaigns: &[Campaign]) -> Result<(), Stop> {
+async fn add(
+    library: &Library,
+    campaigns: &[Campaign],
+    stop: &CancellationToken,
+) -> Result<(), Stop> {
     let tell = |line: &str| tracing::warn!("{line}");
     for campaign in campaigns {
         continuity::check(library, campaign, tell).await?;
         continuity::tell_what_training_lacks(campaign, tell);
     }
     for campaign in campaigns {
-        tracktwin_farm::campaign::store_campaign(library, campaign).await?;
+        tracktwin_farm::campaign::insert_campaign(library, campaign).await?;
+        add_cases(library, campaign, stop).await?;
     }
     Ok(())
+}
+
+/// Adds the cases of a campaign, with log lines of the progress.
+async fn add_cases(
+    library: &Library,
+    campaign: &Campaign,
+    stop: &CancellationToken,
+) -> Result<(), Stop> {
+    let id = campaign.id();
+    let mut next = Instant::now();
+    let tell = |cases: u32, total: u32| {
+        if cases == total || next <= Instant::now() {
+            next = Instant::now() + TELL_EVERY;
+            tracing::info!(campaign = id, cases, total, "adding cases");
+        }
+    };
+    add_cases_told(library, campaign, stop, tell).await
 }
 
 impl Arguments {

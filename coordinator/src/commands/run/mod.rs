@@ -4,6 +4,7 @@ mod room;
 mod sample;
 
 use super::accepted::diagnosis_of;
+use super::campaign::add_cases;
 use super::files::{Force, make_folder};
 use super::library_url::open_or_create;
 use super::numbers::{cores, count};
@@ -315,10 +316,11 @@ async fn simulate(library: &Library, campaign: &Campaign, cores: NonZeroUsize) -
     // A rejected campaign adds nothing to the library.
     let claim = tracktwin_farm::embedded::claim(library).await?;
     room::check(library, campaign).await?;
-    tracktwin_farm::campaign::store_campaign(library, campaign).await?;
+    tracktwin_farm::campaign::insert_campaign(library, campaign).await?;
     let id = campaign.id();
     let shutdown = stop_on_signal("stopping: cases in progress are returned to the library")?;
     let _nothing_left_to_wind_up = shutdown.clone().drop_guard();
+    add_cases(library, campaign, &shutdown).await?;
     let stopped = shutdown.clone();
     let mut progress = None::<Progress>;
     let task = Task::new(&id, campaign.cases, cores);
