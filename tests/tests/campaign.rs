@@ -142,6 +142,40 @@ fn a_run_and_a_coordinator_tell_that_they_add_cases() {
 }
 
 #[test]
+fn a_parameter_that_is_altered_is_restored_with_and_without_results() {
+    let home = Home::new();
+    let (file, out, url) = (home.path("coarse.toml"), home.path("out"), home.library());
+    let simulate = ["run", &file, "--no-train", "--cases", "8", "--out", &out, "--library", &url];
+    let library = |command: &str| run(PROGRAM, &["library", command, "--library", &url]);
+    run(PROGRAM, &simulate).succeeded();
+    let digest = library("digest").succeeded();
+    let alter = "update campaign_case set railpad_stiffness_N_m = 2 * railpad_stiffness_N_m where sobol_index = 3";
+    let discard = "delete from result where sobol_index = 3;
+        update campaign_case set state = 'waiting' where sobol_index = 3";
+    for (change, is_given_up) in [(alter.to_owned(), false), (format!("{alter}; {discard}"), true)]
+    {
+        let mut sqlite = Command::new("sqlite3");
+        let altered = sqlite.arg(home.path("library.sqlite")).arg(change).status();
+        if !altered.is_ok_and(|status| status.success()) {
+            test_needs::skipped("an altered parameter; there is no sqlite3");
+            return;
+        }
+        assert_eq!(library("verify").code, Some(1));
+        run(PROGRAM, &simulate).succeeded();
+        let status = library("status").succeeded();
+        assert_eq!(status.contains("campaign retry --altered"), is_given_up, "{status}");
+        let restored = home.tell(&["retry", "--altered"]).succeeded();
+        assert!(
+            restored.contains("the parameters of 1 cases were restored, 0 cases"),
+            "{restored}"
+        );
+        run(PROGRAM, &simulate).succeeded();
+        assert_eq!(library("digest").succeeded(), digest);
+        library("verify").succeeded();
+    }
+}
+
+#[test]
 fn cases_added_and_tried_again_are_counted_in_json() {
     let home = Home::new();
     let tell = |arguments: &[&str]| -> serde_json::Value {

@@ -222,7 +222,8 @@ impl Session {
         let (refused, taken): (Vec<&farm::Receipt>, Vec<_>) = settled.partition(refused);
         if !refused.is_empty() {
             tracing::warn!(
-                "{} results refused: the coordinator does not know these cases",
+                "{} results refused: the coordinator does not know these leases, or their cases have other \
+                     parameters in the library (`tracktwin library status` lists those)",
                 refused.len()
             );
         }

@@ -53,6 +53,7 @@ mod provenance;
 mod quarantine;
 mod recent;
 mod report;
+mod restore;
 mod result;
 mod state;
 mod tally;
@@ -76,6 +77,7 @@ pub use provenance::{
     SurrogateRecord, TrainingRecord,
 };
 pub use report::{Report, ReportVerdict};
+pub use restore::AlteredCase;
 pub use result::{ContactLoss, LibraryEntry};
 pub use state::{AttemptsMax, CampaignState, State};
 pub use trial::{Question, TrialAnswer, TrialRecord};

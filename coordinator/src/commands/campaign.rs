@@ -54,7 +54,7 @@ pub(super) enum Action {
         #[arg(long)]
         flagged: bool,
         /// Retry instead the cases whose results do not match their checksum; their results are
-        /// deleted.
+        /// deleted. Cases whose parameters were altered get those of the campaign's definition.
         #[arg(long, conflicts_with_all = ["cases", "flagged"])]
         altered: bool,
         /// Retry instead the cases whose results another version of the physics computed; their
@@ -176,12 +176,22 @@ fn waits(state: CampaignState) -> String {
     }
 }
 
-/// Sets cases to waiting.
+/// Sets cases to waiting, and restores altered ones before.
 async fn retry(library: Library, id: &str, which: Retry, json: bool) -> Result<(), Stop> {
+    let restored = match which {
+        Retry::Altered => tracktwin_farm::campaign::restore_cases(&library, id).await?,
+        _ => 0,
+    };
     let again = library.retry(id, which).await?;
     let state = library.campaign_state(id).await?;
-    let line = format!("{id}: {again} cases will be simulated again{}", waits(state));
-    let counts = json!({ "campaign": id, "state": state.name(), "to_simulate": again });
+    let parameters = match restored {
+        0 => String::new(),
+        restored => format!("the parameters of {restored} cases were restored, "),
+    };
+    let line = format!("{id}: {parameters}{again} cases will be simulated again{}", waits(state));
+    let counts = json!({
+        "campaign": id, "state": state.name(), "restored": restored, "to_simulate": again,
+    });
     counted(library, json, &line, &counts).await
 }
 

@@ -1,6 +1,7 @@
 //! Stores campaigns and their cases in a library.
 
 use super::{Campaign, cases};
+use tracktwin_experiment::Experiment;
 use tracktwin_library::{CampaignRecord, Library, LibraryError};
 use tracktwin_parameters::{Case, SobolError};
 
@@ -16,6 +17,29 @@ pub enum StoreError {
     /// The campaign's sequence has fewer points than the campaign has cases.
     #[error(transparent)]
     Cases(#[from] SobolError),
+    /// The stored definition of a campaign cannot be read.
+    #[error(
+        "the definition of campaign {campaign} cannot be used ({reason}): copy the intact rows to another library \
+         with `tracktwin library copy`, and add the campaign's file there"
+    )]
+    Definition {
+        /// Id of the campaign.
+        campaign: String,
+        /// Cause.
+        reason: String,
+    },
+    /// A stored case is not of the campaign's definition.
+    #[error(
+        "case {index} of campaign {campaign} has neither the parameters nor the hash that the campaign's definition \
+         states: copy the intact rows to another library with `tracktwin library copy`, and add the campaign's file \
+         there"
+    )]
+    OtherCase {
+        /// Id of the campaign.
+        campaign: String,
+        /// Index of the case.
+        index: u32,
+    },
 }
 
 /// Stores a campaign and those of its cases that the library lacks.
@@ -58,17 +82,21 @@ pub async fn add_cases(
 ) -> Result<(), StoreError> {
     let id = campaign.id();
     let experiment = &campaign.definition.experiment;
-    let drawn = |case: &Case| {
-        let drawn = experiment.drawn(case);
-        (!drawn.is_empty()).then(|| serde_json::to_string(&drawn).expect("numbers become JSON"))
-    };
     // Cases are stored in order, so the existing ones are the first; those after a gap are kept
     // unchanged.
     let mut stored = library.cases_in_order(&id).await?;
     while goes_on(stored) && stored < campaign.cases {
         let end = campaign.cases.min(stored.saturating_add(CASES_AT_A_TIME));
-        library.insert_cases(&id, &cases(campaign, stored..end)?, drawn).await?;
+        library
+            .insert_cases(&id, &cases(campaign, stored..end)?, |case| drawn(experiment, case))
+            .await?;
         stored = end;
     }
     Ok(())
+}
+
+/// What is drawn for a case besides its parameters, as JSON; `None` if nothing is.
+pub(super) fn drawn(experiment: &Experiment, case: &Case) -> Option<String> {
+    let drawn = experiment.drawn(case);
+    (!drawn.is_empty()).then(|| serde_json::to_string(&drawn).expect("numbers become JSON"))
 }

@@ -41,8 +41,9 @@ pub enum ReportVerdict {
     Duplicate,
     /// The report was a failure of a lease that has ended; nothing changed.
     Late,
-    /// The report was refused and nothing changed: the case does not exist, was never leased to this worker
-    /// under this epoch, or has other parameters.
+    /// The report was refused: the case does not exist, was never leased to this worker under this epoch, or
+    /// has other parameters. Nothing changed, except that a case of the worker's present lease with other
+    /// parameters is given up.
     Refused,
 }
 

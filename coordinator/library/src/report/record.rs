@@ -42,6 +42,10 @@ const FINISH: Text = Text::Each {
         where campaign_id = $1 and sobol_index = any($3)",
 };
 
+/// Error of a case whose parameters are not those that its worker was leased.
+const OTHER_PARAMETERS: &str = "the worker simulated parameters that do not match the case's hash: they were \
+    altered in the library (`tracktwin campaign retry --altered` restores them), or the worker is faulty";
+
 impl Write for Report {
     type Answer = Vec<ReportVerdict>;
 
@@ -60,7 +64,14 @@ impl Write for Report {
                 .as_deref()
                 .map_or(ReportVerdict::Refused, |it| self.verdict(case, it, &earlier));
             verdicts.push(verdict);
-            let (ReportVerdict::Stored, Some(case_state)) = (verdict, case_state) else { continue };
+            let Some(case_state) = case_state else { continue };
+            if verdict == ReportVerdict::Refused && self.is_of_other_parameters(case, case_state) {
+                self.give_up(connection, case, case_state).await?;
+                case_state.state = State::Failed;
+            }
+            if verdict != ReportVerdict::Stored {
+                continue;
+            }
             match &case.outcome {
                 Outcome::Finished(passes) => {
                     if self.overtakes(case, case_state) {
@@ -161,6 +172,33 @@ impl Report {
             (Outcome::Failed { .. }, State::Leased) if present => ReportVerdict::Stored,
             (Outcome::Failed { .. }, _) => ReportVerdict::Late,
         }
+    }
+
+    /// Whether the report belongs to the case's present lease and is refused because of its parameters. It
+    /// would be refused again after every further lease.
+    fn is_of_other_parameters(&self, case: &CaseReport, case_state: &CaseState) -> bool {
+        case_state.state == State::Leased
+            && self.is_present(case, case_state)
+            && case.parameter_hash != case_state.parameter_hash
+    }
+
+    /// Gives up a case whose parameters do not match its hash.
+    async fn give_up(
+        &self,
+        connection: &mut Connection,
+        case: &CaseReport,
+        case_state: &CaseState,
+    ) -> Result<(), LibraryError> {
+        let ended = Ended {
+            campaign: &self.campaign,
+            indices: vec![case.index.into()],
+            attempts: case_state.attempts + 1,
+            state: State::Failed,
+            ending: "failed",
+            error: OTHER_PARAMETERS,
+            now_unix_ms: self.now_unix_ms,
+        };
+        attempt::end(connection, ended).await
     }
 
     async fn fail(

@@ -197,6 +197,34 @@ on_both_databases! {
         assert!(findings.iter().all(|it| it.what.ends_with("does not match its hash")), "{findings:?}");
     }
 
+    async fn a_case_whose_parameters_were_altered_is_given_up_with_the_remedy_and_restored(home: &Home) {
+        let library = home.library(CASES).await;
+        let drawn = Some("{\"vehicle.mass_kg\":50.0}".to_owned());
+        alter(home, ALTERED[5]).await;
+        let leased = lease(&library, "w", CASES, 0).await;
+        let verdicts = report(&library, "w", leased.iter().map(finished).collect()).await;
+        let expected = [ReportVerdict::Stored, ReportVerdict::Refused, ReportVerdict::Stored];
+        assert_eq!(verdicts, expected);
+        let given_up = library.failures(CAMPAIGN, 9).await.unwrap();
+        assert_eq!(given_up.iter().map(|it| it.case.index).collect::<Vec<_>>(), [1]);
+        let error = given_up[0].error.as_deref().unwrap();
+        assert!(error.contains("`tracktwin campaign retry --altered`"), "{error}");
+        // The same report again changes nothing.
+        assert_eq!(report(&library, "w", vec![finished(&leased[1])]).await, [ReportVerdict::Refused]);
+        let altered = library.altered_cases(CAMPAIGN).await.unwrap();
+        assert_eq!(altered.len(), 1);
+        assert_eq!(altered[0].parameter_hash, case(1).parameter_hash());
+        library.restore_cases(CAMPAIGN, vec![(case(1), drawn.clone())]).await.unwrap();
+        assert_eq!(library.altered_cases(CAMPAIGN).await.unwrap(), []);
+        let ask = "select drawn from campaign_case where sobol_index = 1";
+        assert_eq!(crate::data::ask(&library, ask).await.rows, [[Cell::Text(drawn.unwrap())]]);
+        let expected = Status { finished: 2, waiting: 1, ..Status::default() };
+        assert_eq!(library.status(CAMPAIGN).await.unwrap(), expected);
+        let leased = lease(&library, "w", CASES, 0).await;
+        assert_eq!(report(&library, "w", vec![finished(&leased[0])]).await, [ReportVerdict::Stored]);
+        library.training_set(CAMPAIGN, drop).await.unwrap();
+    }
+
     async fn results_that_are_thrown_away_leave_nothing_behind(home: &Home) {
         let library = whole(home).await;
         let flag = if home.folder.is_some() { "update result set flagged = 'x'" } else {
