@@ -211,30 +211,6 @@ on_both_databases! {
         assert_eq!(there.digest(CAMPAIGN).await.unwrap(), library.digest(CAMPAIGN).await.unwrap());
     }
 
-    async fn a_pass_that_an_interrupted_copy_left_is_replaced_by_the_report_of_its_case(home: &Home) {
-        let library = some_of_all(home).await;
-        let other = home.another();
-        let there = other.library(4).await;
-        let results = Table::named("result").unwrap();
-        let mut passes = Vec::new();
-        let keep = async |rows| {
-            passes.extend(rows);
-            Ok::<(), LibraryError>(())
-        };
-        library.read_table(results, 9, keep).await.unwrap();
-        // The copy ended between the two passes of case 0.
-        assert_eq!(there.write_table(results, passes[..1].to_vec()).await.unwrap(), 1);
-        let leased = lease(&there, "v", 2, 0).await;
-        let reports = leased.iter().map(finished).collect();
-        assert_eq!(report(&there, "v", reports).await, [ReportVerdict::Stored; 2]);
-        assert_eq!(there.status(CAMPAIGN).await.unwrap().finished, 2);
-        assert_eq!(there.count(results).await.unwrap(), 4);
-        assert!(there.entry(CAMPAIGN, 0).await.unwrap().is_some());
-        let findings = there.verify(|| ()).await.unwrap().findings;
-        // Its campaign's hashes are single letters.
-        assert!(findings.iter().all(|it| it.what.ends_with("does not match its hash")), "{findings:?}");
-    }
-
     async fn results_of_cases_that_are_not_there_are_refused(home: &Home) {
         let library = some_of_all(home).await;
         let other = home.another();

@@ -5,7 +5,7 @@ use crate::support::{
     reported,
 };
 use tracktwin_experiment::Outcome;
-use tracktwin_library::{LibraryEntry, LibraryError, ReportVerdict};
+use tracktwin_library::{LibraryEntry, LibraryError, ReportVerdict, Table};
 use tracktwin_protocol::CaseReport;
 
 on_both_databases! {
@@ -100,6 +100,31 @@ on_both_databases! {
         let expected =
             [0, 2, 3].map(|index| LibraryEntry { case: case(index), features: features(index) });
         assert_eq!(entries, expected);
+    }
+
+    async fn a_pass_that_an_interrupted_copy_left_is_replaced_by_the_report_of_its_case(home: &Home) {
+        let from = home.library(1).await;
+        let leased = lease(&from, "w", 1, 0).await;
+        report(&from, "w", vec![finished(&leased[0])]).await;
+        let results = Table::named("result").unwrap();
+        let mut passes = Vec::new();
+        let keep = async |rows| {
+            passes.extend(rows);
+            Ok::<(), LibraryError>(())
+        };
+        from.read_table(results, 9, keep).await.unwrap();
+        let home = home.another();
+        let library = home.library(2).await;
+        // The copy ended between the two passes of the case.
+        assert_eq!(library.write_table(results, passes[..1].to_vec()).await.unwrap(), 1);
+        let leased = lease(&library, "v", 2, 0).await;
+        let reports = leased.iter().map(finished).collect();
+        assert_eq!(report(&library, "v", reports).await, [ReportVerdict::Stored; 2]);
+        assert_eq!(library.status(CAMPAIGN).await.unwrap().finished, 2);
+        assert_eq!(library.count(results).await.unwrap(), 4);
+        let findings = library.verify(|| ()).await.unwrap().findings;
+        // Its campaign's hashes are single letters.
+        assert!(findings.iter().all(|it| it.what.ends_with("does not match its hash")), "{findings:?}");
     }
 
     async fn an_unknown_campaign_is_named(home: &Home) {
