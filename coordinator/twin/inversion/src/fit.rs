@@ -33,7 +33,7 @@ const COMMON_ERROR: f64 = 0.08;
 /// number of steps on either side, and distance of the log weight from the greatest one on that side, in nats, at
 /// which a side ends. So a side has at least two steps, and a second minimum behind the first step is found.
 const STEP: f64 = 0.2;
-const STEPS_MAX: u32 = 5;
+const STEPS_MAX: u32 = 12;
 const NEGLIGIBLE: f64 = 3.0;
 
 /// Standard deviation of the logarithm of a mean that is held fixed.
