@@ -144,18 +144,19 @@ async fn by_inversion(arguments: &Arguments) -> Result<(), Stop> {
         return Ok(());
     }
     println_stdout(
-        "unevenness  parameter          sleepers  median |ln error|  in the 90 % interval  correlation  not valid",
+        "unevenness  parameter                   sleepers  median |ln error|  in the 90 % interval  correlation  not \
+         valid",
     );
     for row in &rows {
         for (parameter, score) in &row.estimates {
             println_stdout(&format!(
-                "{:>8.0} %  {:18} {:>8}  {:>17.3}  {:>18.0} %  {:>11.2}  {:>7.1} %",
+                "{:>8.0} %  {:27} {:>8}  {:>17.3}  {:>18.0} %  {:>11}  {:>7.1} %",
                 100.0 * row.scatter,
                 parameter.label(),
                 score.sleepers,
                 score.median_log_error,
                 100.0 * score.holds_90,
-                score.correlation,
+                score.correlation.map_or_else(|| "-".to_owned(), |it| format!("{it:.2}")),
                 100.0 * row.invalid
             ));
         }

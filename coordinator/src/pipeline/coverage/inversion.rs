@@ -15,13 +15,17 @@ use tracktwin_trial::Making;
 /// Unevenness: standard deviation of the logarithm of a stiffness from sleeper to sleeper.
 const SCATTER: [f64; 3] = [0.05, 0.15, 0.3];
 
-/// Reads a parameter of a sleeper.
-type TruthOf = fn(&SleeperTruth) -> f64;
+/// Reads the true value of a parameter at a sleeper of a scene.
+type TruthOf = fn(&Scene, &SleeperTruth) -> f64;
 
-/// Parameters whose true value differs from sleeper to sleeper, with access to this value.
-const COMPARED: [(Parameter, TruthOf); 2] = [
-    (Parameter::RailpadStiffness, |sleeper| sleeper.railpad_stiffness_n_m),
-    (Parameter::BallastStiffness, |sleeper| sleeper.ballast_stiffness_n_m),
+/// The estimated parameters, with access to their true values.
+const COMPARED: [(Parameter, TruthOf); 6] = [
+    (Parameter::RailpadStiffness, |_, sleeper| sleeper.railpad_stiffness_n_m),
+    (Parameter::BallastStiffness, |_, sleeper| sleeper.ballast_stiffness_n_m),
+    (Parameter::IrregularityLevel, |scene, _| scene.irregularity_level),
+    (Parameter::SleeperBendingStiffness, |_, sleeper| sleeper.sleeper_ei_n_m2),
+    (Parameter::RailpadDamping, |scene, _| scene.railpad_damping_n_s_m),
+    (Parameter::BallastDamping, |scene, _| scene.ballast_damping_n_s_m),
 ];
 
 /// Number of sleepers at either end of a recording that are not scored, because of the run-in.
@@ -61,8 +65,8 @@ pub struct InversionScore {
     /// Share of the true values inside the 90 % interval, 0 to 1.
     pub holds_90: f64,
     /// Correlation of the logarithms of estimates and true values along a track. It is the mean over the
-    /// tracks where both vary.
-    pub correlation: f64,
+    /// tracks where both vary; `None` if there is none.
+    pub correlation: Option<f64>,
 }
 
 /// Simulates and evaluates `tracks` tracks for each unevenness. All makings record the same scenes. Progress is
@@ -117,7 +121,7 @@ impl Scores {
             let mut pairs = Vec::new();
             for sleeper in sleepers {
                 let estimate = sleeper.estimates[&parameter];
-                let truth = truth_of(&scene.sleepers[number(&sleeper.id)]);
+                let truth = truth_of(scene, &scene.sleepers[number(&sleeper.id)]);
                 let error = (estimate.mean / truth).ln();
                 self.errors.entry(parameter).or_default().push(error.abs());
                 let holds = (estimate.mean - truth).abs() <= NORMAL_90 * estimate.sd;
@@ -137,7 +141,8 @@ impl Scores {
                 sleepers: errors.len(),
                 median_log_error: errors[errors.len() / 2],
                 holds_90: self.held[&parameter] as f64 / errors.len() as f64,
-                correlation: correlations.iter().sum::<f64>() / correlations.len() as f64,
+                correlation: (!correlations.is_empty())
+                    .then(|| correlations.iter().sum::<f64>() / correlations.len() as f64),
             };
             estimates.insert(parameter, score);
         }
