@@ -85,7 +85,7 @@ pub fn hum(recording: &Recording, turn_m: Option<f64>, alpha: f64) -> Vec<Hum> {
 }
 
 /// All tested frequencies in Hz.
-fn mains_hz() -> impl Iterator<Item = f64> {
+pub(crate) fn mains_hz() -> impl Iterator<Item = f64> {
     MAINS_HZ.into_iter().flat_map(|(mains_hz, harmonics)| {
         (1..=harmonics).map(move |harmonic| mains_hz * harmonic as f64)
     })

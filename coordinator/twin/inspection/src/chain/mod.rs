@@ -23,6 +23,7 @@ pub(crate) use contact::expected_m_s2;
 pub use contact::{LossOfContact, PassLoss, loss_of_contact};
 pub(crate) use gain::of_other_gain;
 pub use gain::{Gain, LevelDifference, gains};
+pub(crate) use hum::mains_hz;
 pub use hum::{Hum, hum, without_hum};
 pub(crate) use offset::misplaced;
 pub use offset::{Offset, Offsets, offsets};

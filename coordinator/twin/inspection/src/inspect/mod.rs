@@ -225,7 +225,10 @@ fn unknown_wheel(recording: &Recording) -> Option<Comb> {
         return None;
     }
     let alpha = EACH_TEST / recording.passes.len().max(1) as f64;
-    recording.passes.iter().find_map(|pass| wheel::comb(pass, alpha))
+    recording
+        .passes
+        .iter()
+        .find_map(|pass| wheel::comb(pass, recording.spacing_m, wheel::CIRCUMFERENCES_M, alpha))
 }
 
 /// Unit of the accelerations in sentences.

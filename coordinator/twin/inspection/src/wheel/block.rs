@@ -1,13 +1,16 @@
 //! One block of a pass: its periodogram, and the power that combs explain.
 
-use crate::along::hann;
+use crate::along::{hann, median};
+use crate::chain::mains_hz;
 use num_complex::Complex64;
 use tracktwin_signal::recording::Pass;
 
 /// Number of bins per resolution cell.
 pub(super) const PADDING: usize = 8;
-/// Number of shifted combs, with teeth between the wheel orders, for the explained variance by chance.
-pub(super) const SHIFTS: usize = 15;
+/// Distance from a tooth, in resolution cells, within which bins belong to the tooth.
+pub(super) const TOOTH_CELLS: f64 = 1.5;
+/// Largest relative error of a speed: half a step of 1 km/h at 67 km/h.
+const SPEED_ERROR: f64 = 7.5e-3;
 
 /// Comb of wheel orders in one block of a pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,6 +80,30 @@ impl Block {
         cell * (first..=last).map(tooth).sum::<f64>() / total.max(f64::MIN_POSITIVE)
     }
 
+    /// Replaces lines that are known to be none of the wheel's by the level beside them: harmonics of the
+    /// sleeper-passing frequency, and the mains.
+    pub(super) fn without_known_lines(mut self, spacing_m: f64, [low, high]: [f64; 2]) -> Self {
+        let passing_hz = self.speed_m_s / spacing_m;
+        let harmonics = (low / passing_hz) as usize..=(high / passing_hz) as usize + 1;
+        let sleepers = harmonics.map(|harmonic| {
+            let frequency_hz = harmonic as f64 * passing_hz;
+            (frequency_hz, SPEED_ERROR * frequency_hz)
+        });
+        for (frequency_hz, error_hz) in sleepers.chain(mains_hz().map(|mains_hz| (mains_hz, 0.0))) {
+            let bin = |cells: f64| {
+                let away_hz = cells * PADDING as f64 * self.step_hz + cells.signum() * error_hz;
+                let bin = ((frequency_hz + away_hz) / self.step_hz).round();
+                (bin.max(0.0) as usize).min(self.power.len())
+            };
+            let [from, first, last, to] =
+                [-3.0, -1.0, 1.0, 3.0].map(|side| bin(side * TOOTH_CELLS));
+            let beside = [&self.power[from..first], &self.power[last..to]].concat();
+            // The mean of a periodogram value is its median over ln 2.
+            self.power[first..last].fill(median(beside) / 2f64.ln());
+        }
+        self
+    }
+
     /// Range of bins of a band in Hz.
     pub(super) fn bins(&self, [low, high]: [f64; 2]) -> std::ops::Range<usize> {
         let bin = |frequency: f64| (frequency / self.step_hz).round() as usize;
@@ -84,7 +111,7 @@ impl Block {
     }
 }
 
-/// Shifts of the combs between the teeth, as shares of the fundamental.
-pub(super) fn shifts() -> impl Iterator<Item = f64> {
-    (0..SHIFTS).map(|index| 0.2 + 0.6 * index as f64 / (SHIFTS - 1) as f64)
+/// Shifts of the combs between the teeth, as shares of the fundamental: with the comb itself `sets` at equal distances.
+pub(super) fn shifts(sets: usize) -> impl Iterator<Item = f64> {
+    (1..sets).map(move |index| index as f64 / sets as f64)
 }

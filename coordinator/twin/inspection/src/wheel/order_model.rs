@@ -1,12 +1,12 @@
 //! Prediction of withheld data by a model of wheel orders.
 
-use super::block::{Block, CombBlock, PADDING, shifts};
-use crate::along::median;
+use super::block::{Block, CombBlock, PADDING, TOOTH_CELLS, shifts};
+use crate::along::{ln_binomial_tail, median};
 
 /// Width in Hz of the bands of the smooth spectrum.
 const SMOOTH_HZ: f64 = 10.0;
-/// Distance from a tooth, in resolution cells, within which bins belong to the tooth.
-const TOOTH_CELLS: f64 = 1.5;
+/// Largest probability of the number of better predicted blocks if the comb predicts no better than the smooth spectrum.
+const BETTER_BY_CHANCE: f64 = 0.05;
 /// Largest relative deviation of the held-out fundamental from the mean of its neighbours. It corresponds
 /// to the share of a resolution cell by which the orders drift in a block.
 const FOLLOW: f64 = 1.5e-3;
@@ -23,8 +23,19 @@ pub struct HeldOut {
     pub by_chance: f64,
     /// Mean gain in log predictive density relative to a smooth spectrum, in nats per block.
     pub gain_nats: f64,
+    /// The same without the quarter of the orders that gain most: sleepers and mains may have lines at some orders.
+    pub weaker_gain_nats: f64,
     /// Number of blocks that the comb predicts better.
     pub better: usize,
+}
+
+impl HeldOut {
+    /// Whether the comb predicts the withheld blocks better: in the mean, also without its strongest orders, and in more
+    /// blocks than by chance.
+    pub(super) fn is_better(&self) -> bool {
+        let ln_p = ln_binomial_tail(self.better, self.blocks, 0.5);
+        self.gain_nats > 0.0 && self.weaker_gain_nats > 0.0 && ln_p <= BETTER_BY_CHANCE.ln()
+    }
 }
 
 /// Expected spectrum: a smooth spectrum plus wheel orders.
@@ -37,23 +48,40 @@ struct OrderModel {
     teeth: Vec<f64>,
 }
 
-/// Scores of the odd blocks for a model fitted to the even ones.
-pub(super) fn held_out(blocks: &[Block], fitted: &[CombBlock], band_hz: [f64; 2]) -> HeldOut {
+/// Scores of the odd blocks for a model fitted to the even ones, beside `sets` of teeth.
+pub(super) fn held_out(
+    blocks: &[Block],
+    fitted: &[CombBlock],
+    band_hz: [f64; 2],
+    sets: usize,
+) -> HeldOut {
     let model = OrderModel::fit(blocks, fitted, band_hz);
     let odd: Vec<usize> = (1..blocks.len()).step_by(2).filter(|i| i + 1 < blocks.len()).collect();
     let count = odd.len().max(1) as f64;
-    let (mut explained, mut by_chance, mut gain_nats, mut better) = (0.0, 0.0, 0.0, 0);
+    let (mut explained, mut by_chance, mut better) = (0.0, 0.0, 0);
+    let mut gains = vec![0.0; model.teeth.len()];
     for &index in &odd {
         let block = &blocks[index];
         let between = 0.5 * (fitted[index - 1].fundamental_hz + fitted[index + 1].fundamental_hz);
         explained += block.near(between, 0.0, band_hz) / count;
-        let others: Vec<f64> = shifts().map(|shift| block.near(between, shift, band_hz)).collect();
+        let others = shifts(sets).map(|shift| block.near(between, shift, band_hz)).collect();
         by_chance += median(others) / count;
-        let gain = model.gain(block, between, band_hz);
-        gain_nats += gain / count;
-        better += usize::from(gain > 0.0);
+        let of_block = model.gains(block, between, band_hz);
+        better += usize::from(of_block.iter().sum::<f64>() > 0.0);
+        for (sum, gain) in gains.iter_mut().zip(of_block) {
+            *sum += gain / count;
+        }
     }
-    HeldOut { blocks: odd.len(), explained, by_chance, gain_nats, better }
+    let gain_nats = gains.iter().sum();
+    let weaker_gain_nats = without_strongest(gains);
+    HeldOut { blocks: odd.len(), explained, by_chance, gain_nats, weaker_gain_nats, better }
+}
+
+/// Sum of the gains of all orders but the quarter that gains most; orders outside the band have none.
+fn without_strongest(mut gains: Vec<f64>) -> f64 {
+    gains.retain(|gain| *gain != 0.0);
+    gains.sort_by(|a, b| b.total_cmp(a));
+    gains[gains.len().div_ceil(4)..].iter().sum()
 }
 
 impl Block {
@@ -98,22 +126,26 @@ impl OrderModel {
     }
 
     /// Log ratio of the predictive density of a block with teeth to that without teeth (Whittle's
-    /// likelihood), in nats for the whole block.
-    fn gain(&self, block: &Block, fundamental: f64, band_hz: [f64; 2]) -> f64 {
+    /// likelihood), in nats for the bins nearest to each order.
+    fn gains(&self, block: &Block, fundamental: f64, band_hz: [f64; 2]) -> Vec<f64> {
         let mean = block.mean_power(band_hz);
-        let gain = |bin: usize| {
+        let mut gains = vec![0.0; self.teeth.len()];
+        for bin in block.bins(band_hz) {
             let (band, order, at_tooth) = block.place(bin, fundamental, band_hz);
             let power = block.power[bin] / mean;
             let plain = self.plain[band.min(self.plain.len() - 1)];
+            let order = order.min(self.teeth.len() - 1);
             let comb = if at_tooth {
-                self.teeth[order.min(self.teeth.len() - 1)]
+                self.teeth[order]
             } else {
                 self.smooth[band.min(self.smooth.len() - 1)]
             };
-            (plain.ln() + power / plain) - (comb.ln() + power / comb)
-        };
-        // Padded bins repeat one another, and Hann leaves two of three cells independent.
-        block.bins(band_hz).map(gain).sum::<f64>() / (1.5 * PADDING as f64)
+            // Padded bins repeat one another, and Hann leaves two of three cells independent.
+            let independent = 1.5 * PADDING as f64;
+            gains[order] +=
+                ((plain.ln() + power / plain) - (comb.ln() + power / comb)) / independent;
+        }
+        gains
     }
 }
 
