@@ -10,6 +10,8 @@ use tracktwin_signal::recording::Pass;
 const ORDER: usize = 40;
 /// Share of the power that is added as white noise, so that a silent band stays solvable.
 const FLOOR: f64 = 1e-9;
+/// Number of steps per distance over which the usual size is determined.
+const STEPS: usize = 20;
 
 /// Innovations of a pass below a frequency.
 ///
@@ -50,6 +52,27 @@ impl Innovations {
     /// Usual size of an innovation, as a standard deviation.
     pub(crate) fn usual(&self) -> f64 {
         median(self.values.iter().map(|value| value.abs()).collect()) / NORMAL_QUARTILE
+    }
+
+    /// Innovations relative to their usual size over `reach_m` before or behind each, whichever is larger: where the
+    /// level of the surface changes, the louder side tells what is usual.
+    pub(crate) fn levelled(&self, reach_m: f64) -> Self {
+        let count = self.values.len();
+        let length_m = self.position_m[count - 1] - self.position_m[0];
+        let step = ((reach_m / length_m * count as f64) as usize / STEPS).max(1);
+        let usual = |from: usize, to: usize| {
+            let values = &self.values[(from * step).min(count)..(to * step).min(count)];
+            median(values.iter().map(|value| value.abs()).collect()) / NORMAL_QUARTILE
+        };
+        let of_step = |place: usize| {
+            let before = usual(place.saturating_sub(STEPS), place);
+            before.max(usual(place + 1, place + 1 + STEPS))
+        };
+        let sizes: Vec<f64> = (0..count.div_ceil(step)).map(of_step).collect();
+        let size = |index: usize| sizes[index / step];
+        let levelled = |(index, value): (usize, &f64)| value / size(index).max(f64::MIN_POSITIVE);
+        let values = self.values.iter().enumerate().map(levelled).collect();
+        Self { position_m: self.position_m.clone(), values }
     }
 
     /// Innovation at a position in m, interpolated; zero beyond the pass.
@@ -128,6 +151,25 @@ mod tests {
         let mean = inner.iter().map(|value| value * value).sum::<f64>() / inner.len() as f64;
         // The blow adds 0.09; noise of variance one before the ringing.
         assert!((mean - 1.09).abs() < 0.05, "{mean}");
+    }
+
+    #[test]
+    fn levelled_innovations_have_one_size_on_either_side_of_a_step() {
+        let mut values = noise(4, 20_000);
+        for value in &mut values[12_000..] {
+            *value *= 5.0;
+        }
+        let position_m = (0..values.len()).map(|index| 1e-3 * index as f64).collect();
+        let levelled = Innovations { position_m, values }.levelled(1.0).values;
+        let deviation = |range: std::ops::Range<usize>| {
+            let values = &levelled[range];
+            (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
+        };
+        for range in [1000..10_900, 12_000..13_000, 13_000..20_000] {
+            assert!((deviation(range.clone()) - 1.0).abs() < 0.1, "{range:?}");
+        }
+        // Just before the step what is behind it is usual.
+        assert!((deviation(11_700..12_000) - 0.2).abs() < 0.05);
     }
 
     #[test]

@@ -3,7 +3,8 @@
 //! A long dip has most of its power where the track resonates; there the power of the surface varies by as
 //! much along the track. The blow at its kink is short only after the ringing is removed. On a surface whose
 //! spectrum falls with the cube of the wave number, the innovations of a kink fall with the square root of the
-//! distance behind it.
+//! distance behind it. The level of the surface changes along the track, so that innovations count relative to those
+//! around them.
 
 use super::coherent::coherent_shape;
 use super::shape::Shape;
@@ -15,6 +16,8 @@ use tracktwin_signal::recording::{Pass, Recording};
 const WAVES_PER_SPACING: f64 = 60.0;
 /// Lengths in sleeper spacings over which innovations are added up behind a kink: 2, 4 and 8 cm on a line.
 const LENGTHS: [f64; 3] = [1.0 / 30.0, 1.0 / 15.0, 2.0 / 15.0];
+/// Distance in sleeper spacings, on either side, over which the usual size of an innovation is determined.
+const NEAR: f64 = 2.0;
 /// Distance in sleeper spacings by which the odometers of two passes may differ, on either side.
 const REACH: f64 = 0.01;
 /// Step of the places in sleeper spacings.
@@ -62,8 +65,10 @@ pub(super) fn kinks(recording: &Recording, alpha: f64) -> Vec<Kink> {
     // As many as there are innovations on the track, for every length.
     let spans = places_m.len() as f64 * STEP;
     let tries = (2.0 * WAVES_PER_SPACING * spans) as usize * LENGTHS.len();
+    let levelled = innovations.iter().map(|pass| pass.levelled(NEAR * spacing_m));
+    let levelled: Vec<Innovations> = levelled.collect();
     let of_length = |length: f64| {
-        let passes = innovations.iter();
+        let passes = levelled.iter();
         let each: Vec<Vec<f64>> =
             passes.map(|pass| blows(pass, length * spacing_m, &places_m)).collect();
         found(&each, &places_m)
@@ -186,6 +191,41 @@ mod tests {
         for kink in found {
             assert!((kink.x_m.0 - 1.3).abs() < 4.0 * kink.x_m.1, "{kink:?}");
             assert!(kink.power_ratio > 10.0, "{kink:?}");
+        }
+    }
+
+    /// Kinks of a surface with a dip of `depth_m` at 1.3 m whose acceleration is multiplied by `gain` of the position.
+    fn of_level(seed: u64, depth_m: f64, gain: &dyn Fn(f64) -> f64) -> Vec<Kink> {
+        let height = |_, x: f64| depth_m * (-(x - 1.3).abs() / 0.03).exp();
+        let chain = |_, samples: &mut [f64], position_m: &mut [f64]| {
+            for (sample, x_m) in samples.iter_mut().zip(position_m) {
+                *sample *= gain(*x_m);
+            }
+        };
+        let recording = Rolled { seed, height_m: &height, chain: &chain }.recording();
+        kinks(&recording, ALPHA)
+    }
+
+    #[test]
+    fn a_change_of_level_along_the_track_has_no_kink() {
+        let step = |x: f64| 1.0 + 2.0 / (1.0 + (-(x - 2.1) / 0.02).exp());
+        let sharp = |x: f64| if x < 2.1 { 1.0 } else { 3.0 };
+        let wave = |x: f64| 2f64.powf((std::f64::consts::TAU * x / 1.5).sin());
+        let gains: [&dyn Fn(f64) -> f64; 3] = [&step, &sharp, &wave];
+        for (number, gain) in gains.into_iter().enumerate() {
+            for seed in 0..6 {
+                let found = of_level(seed, 0.0, gain);
+                assert!(found.is_empty(), "gain {number}, seed {seed}: {found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_dip_at_a_step_of_the_level_has_a_kink() {
+        for (low, high) in [(1.0, 2.0), (2.0, 1.0)] {
+            let found = of_level(2, 1.6e-4, &|x| if x < 1.3 { low } else { high });
+            assert!(!found.is_empty(), "{low} to {high}");
+            assert!((found[0].x_m.0 - 1.3).abs() < 4.0 * found[0].x_m.1, "{found:?}");
         }
     }
 
