@@ -151,7 +151,7 @@ fn report(recording: &Recording, inspection: &Inspection) -> InspectionReport {
             .as_ref()
             .map(|lost| lost.sentence(recording.passes.len())),
         pass_defects: inspection.pass_defects.iter().map(ToString::to_string).collect(),
-        doubts: recording.doubts.clone(),
+        doubts: [recording.doubts.clone(), inspection.doubts()].concat(),
         uses: uses(recording, inspection),
         spectra: curves(recording, |pass| spectrum(&pass.signal)),
         levels: curves(recording, levels),

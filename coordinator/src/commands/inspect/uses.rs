@@ -108,8 +108,8 @@ fn limits(recording: &Recording, inspection: &Inspection) -> Vec<String> {
         let fastest = recording.speeds_km_h().into_iter().fold(0.0, f64::max);
         limits.push(format!(
             "one speed only: effects of constant frequency (structure) and of constant wavelength \
-             (surface) cannot be separated, so corrugation is not tested, and wheel orders only in a long pass \
-             of a wheel whose radius is not stated; add a pass {:.0} km/h slower",
+             (surface) cannot be separated, so corrugation is not tested, and wheel orders only in a long pass; \
+             add a pass {:.0} km/h slower",
             0.25 * fastest
         ));
     }

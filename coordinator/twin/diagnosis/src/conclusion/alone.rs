@@ -50,6 +50,7 @@ pub fn passes_alone(
     notes.extend(inspection.pass_defects.iter().map(ToString::to_string));
     notes.extend(lost(inspection, recording));
     notes.extend(inspection.findings.iter().map(Finding::sentence));
+    notes.extend(inspection.doubts());
     Some(Diagnosis {
         format: FORMAT.to_owned(),
         recording: recording.name.clone(),

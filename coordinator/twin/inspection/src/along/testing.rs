@@ -82,6 +82,59 @@ impl Rolled<'_> {
     }
 }
 
+/// A minute of noise of variance one and tones of this amplitude at every number of waves per metre, recorded at 2 kHz
+/// with a speed in whole kilometres per hour.
+pub(crate) struct LongPass<'a> {
+    pub seed: u64,
+    /// First and last speed in km/h.
+    pub speeds_km_h: [f64; 2],
+    pub amplitude: f64,
+    pub waves_per_m: &'a [f64],
+}
+
+impl LongPass<'_> {
+    const RATE_HZ: f64 = 2000.0;
+    const COUNT: usize = 120_000;
+
+    pub(crate) fn pass(&self) -> Pass {
+        let [first, last] = self.speeds_km_h;
+        let (mut way, mut position) = (0.0, 0.0);
+        let (mut samples, mut position_m) = (Vec::new(), Vec::new());
+        for (index, noise) in noise(self.seed, Self::COUNT).iter().enumerate() {
+            let km_per_h = first + (last - first) * index as f64 / Self::COUNT as f64;
+            way += km_per_h / 3.6 / Self::RATE_HZ;
+            position += km_per_h.round() / 3.6 / Self::RATE_HZ;
+            let tone = |waves: &f64| (TAU * (waves * way + 0.13 * waves * waves)).sin();
+            let tones = self.waves_per_m.iter().map(tone);
+            samples.push(noise + self.amplitude * tones.sum::<f64>());
+            position_m.push(position);
+        }
+        Pass {
+            file: String::new(),
+            speed_km_h: 0.5 * (first + last),
+            signal: Signal::new(Self::RATE_HZ, samples).unwrap(),
+            position_m,
+            axle: None,
+            contact_loss_share: None,
+        }
+    }
+
+    /// The pass alone, over sleepers that are 0.6 m apart, with a wheel of this radius in m.
+    pub(crate) fn recording(&self, radius_m: Option<f64>) -> Recording {
+        let wheel = radius_m.map(|it| ("wheel".to_owned(), serde_json::json!({"radius_m": it})));
+        Recording {
+            name: "long".to_owned(),
+            sample_rate_hz: Self::RATE_HZ,
+            channel: String::new(),
+            passes: vec![self.pass()],
+            sleepers: Vec::new(),
+            nominal: wheel.into_iter().collect(),
+            spacing_m: 0.6,
+            doubts: Vec::new(),
+        }
+    }
+}
+
 /// A hollow `d/2 (1 + cos(2 pi x/l))` around a place.
 pub(crate) fn hollow_m(depth: f64, length: f64, x: f64) -> f64 {
     if x.abs() < 0.5 * length { 0.5 * depth * (1.0 + (TAU * x / length).cos()) } else { 0.0 }

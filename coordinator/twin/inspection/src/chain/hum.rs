@@ -17,7 +17,7 @@ const MAINS_HZ: [(f64, usize); 3] = [(50.0 / 3.0, 2), (50.0, 6), (60.0, 6)];
 /// Duration of a segment in s; over a longer time the mains frequency is not constant.
 const SEGMENT_S: f64 = 4.0;
 /// Largest deviation of the mains from the nominal frequency in Hz.
-const DRIFT_HZ: f64 = 0.1;
+pub(super) const DRIFT_HZ: f64 = 0.1;
 /// A line is detected at a speed if its probability by chance is below this.
 const EACH_SPEED: f64 = 0.05;
 /// Number of speeds at which a line must be detected, if there are that many; at other speeds it may be
@@ -41,7 +41,7 @@ const SAME_LENGTH: f64 = 0.01;
 /// Smallest share of a pass that another one must cover to be compared with it.
 const COVERED: f64 = 0.8;
 /// A line within this number of resolution cells of a sleeper or wheel harmonic may belong to it.
-const CELLS_APART: f64 = 1.5;
+pub(super) const CELLS_APART: f64 = 1.5;
 
 /// A line at a mains frequency.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,15 +91,19 @@ pub(crate) fn mains_hz() -> impl Iterator<Item = f64> {
     })
 }
 
+/// Number of segments of this number of samples.
+pub(super) fn segments(samples: usize, rate_hz: f64) -> usize {
+    ((samples as f64 / rate_hz / SEGMENT_S) as usize).max(1)
+}
+
 /// The recording without these lines. In every pass, or every segment of a long one, the tone that fits best within
 /// the drift of the mains is subtracted.
 pub fn without_hum(recording: &Recording, lines: &[Hum]) -> Recording {
     let mut cleared = recording.clone();
     for pass in &mut cleared.passes {
         let rate_hz = pass.signal.sample_rate_hz();
-        let segments = ((pass.signal.duration_s() / SEGMENT_S) as usize).max(1);
         let mut samples = pass.signal.samples().to_vec();
-        let length = samples.len().div_ceil(segments);
+        let length = samples.len().div_ceil(segments(samples.len(), rate_hz));
         for part in samples.chunks_mut(length) {
             for line in lines {
                 subtract_tone(part, line.frequency_hz, rate_hz);
@@ -325,8 +329,7 @@ impl PassSpectra {
     /// Spectra of samples of a pass, or of what it has beside others.
     fn new(samples: &[f64], pass: &Pass) -> Self {
         let rate_hz = pass.signal.sample_rate_hz();
-        let segments = ((samples.len() as f64 / rate_hz / SEGMENT_S) as usize).max(1);
-        let length = samples.len() / segments;
+        let length = samples.len() / segments(samples.len(), rate_hz);
         let spectrum = |part: &[f64]| {
             let mean = part.iter().sum::<f64>() / length as f64;
             let values: Vec<_> = part.iter().map(|value| Complex64::from(value - mean)).collect();

@@ -9,7 +9,7 @@ use self::findings::{
     clipping_finding, comb_finding, corrugation_finding, flat_finding, gain_finding, hum_finding,
     impact_finding, offset_finding, order_finding, scale_finding,
 };
-use crate::along::by_speed;
+use crate::along::{by_speed, separate_wavelengths};
 use crate::chain::{Gain, Hum, LossOfContact, Offsets, PassDefect};
 use crate::finding::{Finding, Place};
 use crate::wheel::{Comb, Flat, Order};
@@ -48,6 +48,8 @@ pub struct Inspection {
     pub noise_floors: Vec<Option<f64>>,
     /// Lines of the mains in the recording.
     pub hum: Vec<Hum>,
+    /// Lines at frequencies of the mains that may be orders of the wheel as well.
+    pub hum_or_orders: Vec<Hum>,
     /// Gains between passes at one speed.
     pub gains: Vec<Gain>,
     /// Offsets between passes at one speed.
@@ -58,7 +60,7 @@ pub struct Inspection {
     /// Passes that cannot be compared with a track, because their gain differs from that of another pass at their
     /// speed. Empty if fewer than two speeds would be left.
     pub of_other_gain: Vec<usize>,
-    /// The comb of wheel orders for a wheel of unknown circumference, from the first pass with a comb.
+    /// The comb of wheel orders at one speed, from the first pass with a comb.
     pub comb: Option<Comb>,
 }
 
@@ -116,6 +118,18 @@ impl Inspection {
         [of_position, of_gain].into_iter().filter_map(note).collect()
     }
 
+    /// What the passes leave open, a sentence each.
+    pub fn doubts(&self) -> Vec<String> {
+        let lines = self.hum_or_orders.iter().map(|line| format!("{:.1} Hz", line.frequency_hz));
+        let lines: Vec<String> = lines.collect();
+        let doubt = format!(
+            "lines at {} may be orders of the wheel or hum of the mains: a pass at another speed would distinguish \
+             them",
+            lines.join(", ")
+        );
+        if lines.is_empty() { Vec::new() } else { vec![doubt] }
+    }
+
     /// The defect that makes the whole recording unusable, if any: a pass without a signal, or passes that
     /// are unrelated to each other or to those at other speeds, unless a position error was found.
     pub fn refusal(&self) -> Option<&PassDefect> {
@@ -151,12 +165,13 @@ pub fn inspect(recording: &Recording) -> Inspection {
     let is_flight_known = chain::expected_m_s2(recording).is_some();
     let cut = clipping_finding(&clipping, recording.passes.len(), unit, is_flight_known);
     let mut findings: Vec<Finding> = cut.into_iter().collect();
+    let comb = comb_of_wheel(recording, flat.is_none() && orders.is_empty());
     let hum = chain::hum(recording, turn_m, EACH_TEST);
+    let (hum_or_orders, hum) = separate_orders(recording, comb.as_ref(), flat.as_ref(), hum);
     findings.extend(hum_finding(&hum, unit));
     findings.extend(gains.iter().filter(|gain| gain.is_error(EACH_TEST)).map(gain_finding));
     let scale = chain::scale(recording).filter(|scale| scale.ln_p <= EACH_TEST.ln());
     findings.extend(scale.as_ref().map(scale_finding));
-    let comb = unknown_wheel(recording);
     findings.extend(comb.as_ref().map(comb_finding));
     let pass_defects = chain::pass_defects(recording, &offsets);
     // Blows of a flat lie elsewhere in every pass, and clipped crests are alike: passes with them are not to be laid
@@ -187,6 +202,7 @@ pub fn inspect(recording: &Recording) -> Inspection {
         pass_defects,
         noise_floors: chain::noise_floors(recording),
         hum,
+        hum_or_orders,
         gains,
         offsets,
         misplaced,
@@ -219,16 +235,41 @@ fn is_landing(finding: &Finding, lost: &LossOfContact) -> bool {
     lost.x_m.iter().any(|&[from_m, to_m]| from_m < middle_m && middle_m <= to_m)
 }
 
-/// The comb of wheel orders, if the recording does not state the circumference.
-fn unknown_wheel(recording: &Recording) -> Option<Comb> {
-    if wheel::nominal_circumference_m(recording).is_some() {
+/// The comb of wheel orders: of any circumference, or at one speed near the stated one if nothing `else_unknown` is known
+/// of the wheel.
+fn comb_of_wheel(recording: &Recording, else_unknown: bool) -> Option<Comb> {
+    let near =
+        |stated_m: f64| [1.0 - wheel::TOLERANCE, 1.0 + wheel::TOLERANCE].map(|it| it * stated_m);
+    let stated_m = wheel::nominal_circumference_m(recording);
+    let is_searched = else_unknown && !separate_wavelengths(&recording.speeds_km_h());
+    if stated_m.is_some() && !is_searched {
         return None;
     }
+    let circumferences_m = stated_m.map_or(wheel::CIRCUMFERENCES_M, near);
     let alpha = EACH_TEST / recording.passes.len().max(1) as f64;
-    recording
-        .passes
-        .iter()
-        .find_map(|pass| wheel::comb(pass, recording.spacing_m, wheel::CIRCUMFERENCES_M, alpha))
+    let comb = |pass| wheel::comb(pass, recording.spacing_m, circumferences_m, alpha);
+    recording.passes.iter().find_map(comb)
+}
+
+/// Lines of the mains that may be orders of the wheel, and the others. The wheel is that of the comb; else that of the flat
+/// or, at one speed, the stated one.
+fn separate_orders(
+    recording: &Recording,
+    comb: Option<&Comb>,
+    flat: Option<&Flat>,
+    hum: Vec<Hum>,
+) -> (Vec<Hum>, Vec<Hum>) {
+    let is_one_speed = by_speed(&recording.passes).len() == 1;
+    let stated_m = wheel::nominal_circumference_m(recording).filter(|_| is_one_speed);
+    let stated_m = stated_m.map(|length_m| (length_m, 0.5 * wheel::TOLERANCE * length_m));
+    let wheels_m = match comb {
+        Some(comb) => vec![comb.circumference_m],
+        None => flat.map(|flat| flat.circumference_m).into_iter().chain(stated_m).collect(),
+    };
+    hum.into_iter().partition(|line| {
+        let may_be = |&turn_m| chain::may_be_order(recording, line.frequency_hz, turn_m);
+        wheels_m.iter().any(may_be)
+    })
 }
 
 /// Unit of the accelerations in sentences.
@@ -289,114 +330,4 @@ fn common_places(blows_m: &[Vec<f64>], speeds: &[Vec<usize>], reach_m: f64) -> V
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::along::testing::{Chain, Rolled, independent};
-    use tracktwin_track::extension::CLIPPING;
-
-    /// Names that the passes of a recording give.
-    fn names(recording: &Recording) -> Vec<&'static str> {
-        let inspection = inspect(recording);
-        assert!(inspection.pass_defects.is_empty(), "{:?}", inspection.pass_defects);
-        inspection.findings.iter().map(|finding| finding.physics).collect()
-    }
-
-    #[test]
-    fn a_recording_without_defects_of_surface_wheel_or_chain_gives_no_name() {
-        // One without left-out physics, one whose sleepers hang, one with a resonance of the sensor:
-        // the others are looked at in a longer run.
-        for recording in ["dev-01", "dev-04", "dev-08"].into_iter().flat_map(independent) {
-            let names = names(&recording);
-            assert!(names.is_empty(), "{}: {names:?}", recording.name);
-        }
-    }
-
-    #[test]
-    fn the_wheel_bouncing_on_the_track_is_no_wave_where_there_is_one_speed() {
-        for (recording, speed_km_h) in [("dev-01", 7.0), ("dev-10", 13.0)] {
-            for mut recording in independent(recording) {
-                recording.passes.retain(|pass| pass.speed_km_h.total_cmp(&speed_km_h).is_eq());
-                assert_eq!(inspect(&recording).findings, [], "{}", recording.name);
-            }
-        }
-    }
-
-    #[test]
-    fn a_dip_waves_and_a_flat_are_named_and_nothing_else() {
-        for (recording, expected) in
-            [("dev-02", "rail_joint"), ("dev-06", "corrugation"), ("dev-09", "wheel_flat")]
-        {
-            for recording in independent(recording) {
-                assert_eq!(names(&recording), [expected], "{}", recording.name);
-            }
-        }
-    }
-
-    #[test]
-    fn passes_that_are_mostly_clipped_are_not_laid_on_each_other() {
-        let shift = |pass: usize, position_m: &mut [f64]| {
-            if pass == 1 {
-                for x_m in position_m {
-                    *x_m += 0.016;
-                }
-            }
-        };
-        let shifted = |pass: usize, _: &mut [f64], position_m: &mut [f64]| shift(pass, position_m);
-        let clipped = |pass: usize, samples: &mut [f64], position_m: &mut [f64]| {
-            shift(pass, position_m);
-            let mean_square = samples.iter().map(|it| it * it).sum::<f64>() / samples.len() as f64;
-            let limit = 0.3 * mean_square.sqrt();
-            for sample in samples {
-                *sample = sample.clamp(-limit, limit);
-            }
-        };
-        let finds = |chain: &Chain<'_>, physics: &str| {
-            let recording = Rolled { chain, ..Rolled::faultless(6) }.recording();
-            inspect(&recording).findings.iter().any(|finding| finding.physics == physics)
-        };
-        assert!(finds(&shifted, POSITION_ERROR.physics));
-        assert!(finds(&clipped, CLIPPING.physics) && !finds(&clipped, POSITION_ERROR.physics));
-    }
-
-    #[test]
-    fn a_place_is_common_if_some_pass_of_every_speed_has_a_blow_there() {
-        let blows_m = [vec![0.5, 0.9], vec![0.7], vec![0.71, 1.1], vec![0.3]];
-        let of = |speeds: &[Vec<usize>]| common_places(&blows_m, speeds, 0.02);
-        let found = of(&[vec![0, 1], vec![2, 3]]);
-        assert_eq!(found.len(), 1);
-        assert!(found[0][0] < 0.7 && 0.7 < found[0][1], "{found:?}");
-        assert!(of(&[vec![0], vec![1], vec![2]]).is_empty());
-    }
-
-    #[test]
-    fn speeds_that_share_no_surface_are_refused() {
-        let mut recording = Rolled::faultless(6).recording();
-        assert_eq!(inspect(&recording).refusal(), None);
-        let elsewhere = Rolled::faultless(7).recording().passes.split_off(2);
-        recording.passes.splice(2.., elsewhere);
-        let inspection = inspect(&recording);
-        assert!(
-            matches!(inspection.refusal(), Some(PassDefect::UnrelatedSpeed { .. })),
-            "{:?}",
-            inspection.pass_defects
-        );
-    }
-
-    #[test]
-    #[ignore = "takes two minutes"]
-    fn of_a_hundred_faultless_recordings_few_raise_an_alarm() {
-        let alarms = (0..100).filter(|&seed| {
-            let mut recording = Rolled::faultless(1000 + seed).recording();
-            let radius = Rolled::CIRCUMFERENCE_M / std::f64::consts::TAU;
-            let wheel = serde_json::json!({"radius_m": radius});
-            recording.nominal.insert("wheel".to_owned(), wheel);
-            let found = inspect(&recording).findings;
-            for finding in &found {
-                println!("seed {seed}: {} {:e}", finding.physics, finding.p_value);
-            }
-            !found.is_empty()
-        });
-        // Two are expected at most; more than seven have a probability below 0.1 %.
-        assert!(alarms.count() <= 7);
-    }
-}
+mod tests;

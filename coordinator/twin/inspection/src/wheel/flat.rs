@@ -5,7 +5,7 @@ use crate::impact::{Cells, ImpactKind, Observed, Shape, cells, fit};
 use tracktwin_signal::recording::Recording;
 
 /// Largest relative deviation of the circumference from its nominal value, from wear and odometer scale.
-const TOLERANCE: f64 = 0.02;
+pub(crate) const TOLERANCE: f64 = 0.02;
 /// Smallest number of turns in a pass; with fewer the blows may belong to the track.
 const TURNS_MIN: f64 = 3.0;
 /// Lower limit of the log probability of one blow: one or two impacts of the track are no flat.

@@ -12,6 +12,7 @@ mod out_of_round;
 
 pub use block::CombBlock;
 pub use comb::{CIRCUMFERENCES_M, Comb, comb};
+pub(crate) use flat::TOLERANCE;
 pub use flat::{Flat, flat};
 pub use order_model::HeldOut;
 pub use out_of_round::{Order, out_of_round};

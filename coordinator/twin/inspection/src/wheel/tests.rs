@@ -1,10 +1,9 @@
 //! Wheels whose truth is known.
 
 use super::{CIRCUMFERENCES_M, Comb, Order, flat, nominal_circumference_m, out_of_round};
-use crate::along::testing::{Rolled, hollow_m, independent, noise};
+use crate::along::testing::{LongPass, Rolled, hollow_m, independent};
 use std::f64::consts::TAU;
 use test_needs::shared_data;
-use tracktwin_signal::Signal;
 use tracktwin_signal::recording::Pass;
 use tracktwin_signal::recording::import::{AccelerationUnit, Layout, import};
 
@@ -113,31 +112,9 @@ fn the_flat_of_an_independent_recording_is_measured() {
     }
 }
 
-/// A minute of a wheel at a speed that grows from 66 to 68 km/h, recorded at 2 kHz with a speed in whole kilometres per
-/// hour: noise, and a tone of this amplitude at every number of waves per metre.
+/// A minute of a wheel at a speed that grows from 66 to 68 km/h.
 fn long_pass(seed: u64, amplitude: f64, waves_per_m: &[f64]) -> Pass {
-    const RATE_HZ: f64 = 2000.0;
-    let noise = noise(seed, 60 * 2000);
-    let (mut way, mut position) = (0.0, 0.0);
-    let (mut samples, mut position_m) = (Vec::new(), Vec::new());
-    for (index, noise) in noise.iter().enumerate() {
-        let km_per_h = 66.0 + 2.0 * index as f64 / 120_000.0;
-        way += km_per_h / 3.6 / RATE_HZ;
-        position += km_per_h.round() / 3.6 / RATE_HZ;
-        let tones =
-            waves_per_m.iter().map(|waves| (TAU * (waves * way + 0.13 * waves * waves)).sin());
-        samples.push(noise + amplitude * tones.sum::<f64>());
-        position_m.push(position);
-    }
-    let signal = Signal::new(RATE_HZ, samples).unwrap();
-    Pass {
-        file: String::new(),
-        speed_km_h: 67.0,
-        signal,
-        position_m,
-        axle: None,
-        contact_loss_share: None,
-    }
+    LongPass { seed, speeds_km_h: [66.0, 68.0], amplitude, waves_per_m }.pass()
 }
 
 fn comb(pass: &Pass) -> Option<Comb> {
