@@ -20,5 +20,5 @@ pub(crate) use line::{LOBE, Line, Ruler, Spectrum, amplitude, index_at, on_even_
 pub(crate) use surface::Surface;
 pub(crate) use tail::{
     bonferroni, combine_dependent_p_values, ln_binomial_tail, ln_gamma_tail, ln_normal_bound,
-    ln_student_tail,
+    ln_ratio_tail, ln_student_tail,
 };

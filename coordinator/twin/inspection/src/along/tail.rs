@@ -48,6 +48,16 @@ pub(crate) fn ln_line_tail(neighbours: f64, ratio: f64) -> f64 {
     -neighbours * (ratio.max(0.0) / neighbours).ln_1p()
 }
 
+/// `ln P(R >= ratio)` for the ratio `R` of two independent gamma variables of these shapes and mean one.
+///
+/// `R` has an F distribution with twice as many degrees of freedom. Source: Abramowitz & Stegun 26.6.2.
+pub(crate) fn ln_ratio_tail([above, below]: [f64; 2], ratio: f64) -> f64 {
+    if ratio <= 0.0 {
+        return 0.0;
+    }
+    ln_incomplete_beta(below, above, below / (below + above * ratio)).min(0.0)
+}
+
 /// `ln P(T >= t)` for a Student variable with `freedom` degrees of freedom.
 pub(crate) fn ln_student_tail(freedom: f64, t: f64) -> f64 {
     if t <= 0.0 {
@@ -143,6 +153,23 @@ mod tests {
     fn a_line_over_many_neighbours_has_an_exponential_tail() {
         assert!((ln_line_tail(1e9, 7.0) + 7.0).abs() < 1e-6);
         assert!(ln_line_tail(10.0, 7.0) > -7.0);
+    }
+
+    #[test]
+    fn ratio_tails_are_those_of_f_tables() {
+        // F with 4 and 10, and with 12 and 20 degrees of freedom at their 5 % and 1 % points.
+        for (shapes, point, tail) in [
+            ([2.0, 5.0], 3.478, 0.05),
+            ([2.0, 5.0], 5.994, 0.01),
+            ([6.0, 10.0], 2.278, 0.05),
+            ([6.0, 10.0], 3.231, 0.01),
+        ] {
+            let found = ln_ratio_tail(shapes, point).exp();
+            assert!((found / tail - 1.0).abs() < 2e-3, "{found} against {tail}");
+        }
+        // Over a known mean the tail is a gamma variable's.
+        let gamma = ln_gamma_tail(6.0, 5.0);
+        assert!((ln_ratio_tail([6.0, 1e7], 5.0) / gamma - 1.0).abs() < 1e-4);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Power in short cells along the track for every pass, with tail probabilities.
 
-use crate::along::{Background, Energy, by_speed, ln_gamma_tail, median, speed_m_s, whitened};
+use crate::along::{Background, Energy, by_speed, ln_ratio_tail, median, speed_m_s, whitened};
 use std::ops::Range;
 use tracktwin_number::NORMAL_QUARTILE;
 use tracktwin_signal::recording::{Pass, Recording};
@@ -27,6 +27,8 @@ const CELL_SHARE: f64 = 0.08;
 const PRODUCT_MIN: f64 = 6.0;
 /// Number of steps per cell: neighbouring cells overlap by half.
 const STEPS: usize = 2;
+/// Variance of a median over that of a mean of as many normal variables.
+const MEDIAN_VARIANCE: f64 = std::f64::consts::FRAC_PI_2;
 /// Number of bays on either side, and smallest number of all, that tell what is usual at one place of a bay.
 const BAYS: f64 = 20.0;
 const BAYS_MIN: usize = 8;
@@ -81,8 +83,9 @@ pub(crate) struct Cells {
     pub width_m: f64,
     /// Power of every cell relative to the median around it.
     pub ratio: Vec<f64>,
-    /// Shape of the gamma distribution that the ratios follow without impacts.
-    pub shape: f64,
+    /// Shapes of the gamma distributions of a power and of the median around it, whose ratio the ratios are without
+    /// impacts.
+    pub shapes: [f64; 2],
     /// Indices of the averaged passes.
     pub passes: Vec<usize>,
 }
@@ -95,7 +98,7 @@ impl Cells {
 
     /// `ln P` of a cell's power without an impact.
     pub(crate) fn ln_tail(&self, cell: usize) -> f64 {
-        ln_gamma_tail(self.shape, self.ratio[cell])
+        ln_ratio_tail(self.shapes, self.ratio[cell])
     }
 }
 
@@ -154,14 +157,23 @@ impl Grid {
             }
         }
         self.remove_usual_profile(&mut ratio);
-        let shape = shape(&ratio)?;
+        let shapes = self.shapes(shape(&ratio)?);
         // The median of a gamma variable lies below its mean (Wilson and Hilferty).
-        let median_over_mean = (1.0 - 1.0 / (9.0 * shape)).powi(3);
+        let median_over_mean = (1.0 - 1.0 / (9.0 * shapes[0])).powi(3);
         for value in &mut ratio {
             *value *= median_over_mean;
         }
         let Self { first_m, step_m, width_m, .. } = *self;
-        Some(Cells { first_m, step_m, width_m, ratio, shape, passes: group })
+        Some(Cells { first_m, step_m, width_m, ratio, shapes, passes: group })
+    }
+
+    /// Shapes of a power and of the median around it, from that of their ratio: relative variances add up. Of the cells
+    /// around, which overlap, every second counts.
+    fn shapes(&self, of_ratio: f64) -> [f64; 2] {
+        let independent = (2 * self.near + 1) as f64 / STEPS as f64;
+        let variance = MEDIAN_VARIANCE / independent;
+        let power = of_ratio * (1.0 + variance);
+        [power, power / variance]
     }
 
     fn powers(&self, pass: &Pass) -> Option<Vec<f64>> {
