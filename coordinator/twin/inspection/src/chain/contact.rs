@@ -19,9 +19,10 @@ const OFF_MAX: f64 = 2.0;
 /// Smallest ratio of the extreme value on the other side to the level, if the level is not the limit of the
 /// recorder.
 const BEYOND: f64 = 1.05;
-/// Smallest number of flat crests in a pass that determine a level without a stated value; `EVEN_LN_P` is
-/// the largest log probability of a single constant crest by chance.
+/// Smallest number of flat crests in a pass that determine a level without a stated value, and the largest probability
+/// of as many by chance; `EVEN_LN_P` is the largest log probability of a single constant crest by chance.
 const CRESTS_MIN: usize = 2;
+const CRESTS_BY_CHANCE: f64 = 0.005;
 const EVEN_LN_P: f64 = -20.0;
 /// Share of equal neighbours in a plateau from which on a recorder holds the value.
 const HELD: f64 = 0.8;
@@ -235,7 +236,8 @@ fn by_shape(pass: &Pass, expected: Option<f64>, least: f64) -> Option<Plateaus> 
     let standstill = Standstill::longest(samples);
     let is_even = standstill.is_at_limit(samples, 1.0) && standstill.ln_p < EVEN_LN_P;
     let may_be = |level: f64| (1.0 / OFF_MAX..=OFF_MAX).contains(&(found.level / level));
-    let is_flight = (found.crests.len() >= CRESTS_MIN || is_even)
+    let are_flat = found.crests.len() >= CRESTS_MIN && found.ln_p() <= CRESTS_BY_CHANCE.ln();
+    let is_flight = (are_flat || is_even)
         && expected.is_none_or(may_be)
         && -least >= BEYOND * found.level
         && !is_held(pass, &found.crests);

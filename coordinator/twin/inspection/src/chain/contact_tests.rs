@@ -5,6 +5,7 @@ use crate::along::testing::noise;
 use crate::finding::Place;
 use crate::inspect::inspect;
 use serde_json::json;
+use std::f64::consts::TAU;
 use std::sync::LazyLock;
 use tracktwin_parameters::{ParameterSet, TrackDesign};
 use tracktwin_signal::Signal;
@@ -207,6 +208,25 @@ fn a_wheel_that_stays_on_the_rail_is_not_in_the_air() {
             assert_eq!(loss_of_contact(&recording), None, "{level}");
         }
     }
+}
+
+#[test]
+fn a_strong_tone_with_few_flat_crests_is_not_in_the_air() {
+    let mut recording = without_vehicle(DEEP.clone());
+    recording.passes.truncate(1);
+    let pass = &mut recording.passes[0];
+    // 20 s at 5 kHz: a tone whose strength varies, and noise.
+    let (rate_hz, count) = (5000.0, 100_000);
+    let sample = |(index, noise): (usize, f64)| {
+        let time_s = index as f64 / rate_hz;
+        let strength = 1.0 + 0.02 * (TAU * 0.11 * time_s).sin();
+        30.0 * strength * (TAU * 83.3 * time_s).sin() + noise
+    };
+    let samples = noise(3, count).into_iter().enumerate().map(sample);
+    pass.signal = Signal::new(rate_hz, samples.collect()).unwrap();
+    pass.position_m = (0..count).map(|index| 18.7 / rate_hz * index as f64).collect();
+    recording.sample_rate_hz = rate_hz;
+    assert_eq!(loss_of_contact(&recording), None);
 }
 
 #[test]
