@@ -31,7 +31,8 @@ pub struct Clipping {
 /// Detects clipped passes, with a false-alarm rate of `alpha` for the recording.
 ///
 /// High crests are rarer than low ones. Without a limit, of the crests in two layers of equal thickness
-/// below the greatest value at most half lie in the upper layer, except by chance. Also, no crest is
+/// below the greatest value at most half lie in the upper layer, except by chance. The crests of a tone are of one
+/// height, too; so half of the upper crests must have equal samples at the top. Also, no crest is
 /// constant for longer than the steps of the recorder explain. A side on which the wheel loses contact, or
 /// nearly does, is not attributed to the recorder; see [`super::loss_of_contact`].
 pub fn clipping(recording: &Recording, alpha: f64) -> Vec<Clipping> {
@@ -62,31 +63,27 @@ fn side(index: usize, pass: &Pass, sign: f64) -> Clipping {
     let values: Vec<f64> = samples.iter().map(|sample| sign * (sample - mean)).collect();
     let greatest = values.iter().copied().fold(0.0, f64::max);
     let [upper, lower] = [1.0 - LAYER, 1.0 - 2.0 * LAYER].map(|share| share * greatest);
-    let (mut high, mut next, mut within) = (0, 0, 0);
-    let mut crest = f64::MIN;
-    for &value in &values {
-        within += usize::from(value > upper);
-        // A crest is what lies between two descents below both layers.
-        if value > lower {
-            crest = crest.max(value);
-        } else if crest > lower {
-            if crest > upper {
-                high += 1;
-            } else {
-                next += 1;
-            }
-            crest = f64::MIN;
-        }
-    }
+    // A crest is what lies between two descents below both layers.
+    let crests = values.split(|&value| value <= lower).filter(|crest| !crest.is_empty());
+    let (tops, others): (Vec<&[f64]>, Vec<&[f64]>) =
+        crests.partition(|crest| crest.iter().any(|&value| value > upper));
+    let (high, next) = (tops.len(), others.len());
+    let level = tops.iter().filter(|crest| is_level(crest, upper, greatest)).count();
+    let within = values.iter().filter(|&&value| value > upper).count();
+    let ln_thinned = if 2 * level >= high { ln_binomial_tail(high, high + next, 0.5) } else { 0.0 };
     Clipping {
         pass: index,
         level_m_s2: sign * greatest + mean,
         crests: high,
         share: within as f64 / samples.len() as f64,
-        ln_p: ln_binomial_tail(high, high + next, 0.5)
-            .min(ln_even(samples, sign))
-            .min(ln_flat(&values, greatest)),
+        ln_p: ln_thinned.min(ln_even(samples, sign)).min(ln_flat(&values, greatest)),
     }
+}
+
+/// Whether a crest has equal neighbours above `upper`, or the greatest value of the pass.
+fn is_level(crest: &[f64], upper: f64, greatest: f64) -> bool {
+    let is_even = |pair: &[f64]| pair[0] > upper && pair[0].total_cmp(&pair[1]).is_eq();
+    crest.windows(2).any(is_even) || crest.iter().any(|value| value.total_cmp(&greatest).is_eq())
 }
 
 /// `ln P` of flat crests at the greatest value; 0 without flat crests.

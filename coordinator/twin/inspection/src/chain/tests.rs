@@ -43,6 +43,22 @@ fn a_limit_that_few_long_crests_reach_is_found_and_is_no_drop_out() {
     assert!(!pass_defects.iter().any(drop_out), "{pass_defects:?}");
 }
 
+#[test]
+fn a_strong_tone_is_not_clipped() {
+    let tone = |limit: f64| {
+        let recording = measured(1, &|_, samples, _| {
+            let noise = noise(5, samples.len());
+            for (index, (sample, noise)) in samples.iter_mut().zip(noise).enumerate() {
+                let wave = (TAU * 83.3 * index as f64 / Rolled::RATE_HZ).sin();
+                *sample = (30.0 * wave + 0.05 * noise).min(limit);
+            }
+        });
+        clipping(&recording, ALPHA)
+    };
+    assert!(tone(f64::INFINITY).is_empty(), "{:?}", tone(f64::INFINITY));
+    assert_eq!(tone(29.9).len(), 4);
+}
+
 /// Adds a narrow band around 200 Hz that differs from pass to pass, as loud as the rest, then the gain of pass 1.
 fn with_ringing(factor: f64) -> Recording {
     measured(5, &|pass, samples, _| {
