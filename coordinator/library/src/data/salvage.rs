@@ -8,6 +8,10 @@ use std::ops::Range;
 /// Number of rows or cases that are read together. A range that cannot be read is divided into halves.
 const TOGETHER: i64 = 1024;
 
+/// Number of neighbouring ranges without a readable row after which ranges are skipped: the rows below an
+/// interior page of the file. From then on each skip is twice as long as the last.
+const RANGES_READ: u32 = 8;
+
 /// Upper limit of the indices searched if the number of cases is unknown.
 const INDICES_MAX: i64 = 1 << 20;
 
@@ -20,9 +24,19 @@ pub struct Lost {
     pub reason: String,
 }
 
+/// Rows of a table that are addressed by a number.
+struct Numbered {
+    /// Statement that selects the rows of a range: from $1 on, below $2, after the values bound already.
+    rows: Statement,
+    /// Statement that selects the first number from $1 on, as `n`; `None` if the numbers are dense.
+    first: Option<Statement>,
+    /// Largest number.
+    max: i64,
+}
+
 /// How to address the rows of a table one by one.
 enum Way {
-    /// By `rowid` of `SQLite`, without use of any index.
+    /// By `rowid` of `SQLite`.
     Rowid { max: i64 },
     /// By campaign and case index.
     Index { campaigns: Vec<(String, i64)> },
@@ -50,66 +64,100 @@ impl Library {
             return Err(error.into());
         }
         let reason = super::verify::reason(&error);
-        let ranges = match self.way(table).await {
-            Way::Rowid { max } => {
-                let ask = format!(
-                    "select {} from {} not indexed where rowid >= $1 and rowid < $2",
-                    table.column_list(),
-                    table.name
-                );
-                vec![(sql(ask), max)]
-            }
-            Way::Index { campaigns } => {
-                let ask = format!(
-                    "select {} from {} where campaign_id = $1 and sobol_index >= $2
-                        and sobol_index < $3",
-                    table.column_list(),
-                    table.name
-                );
-                let of = |(campaign, max): (String, i64)| (sql(ask.clone()).bind(campaign), max);
-                campaigns.into_iter().map(of).collect()
-            }
+        let numbered = match self.way(table).await {
+            Way::Rowid { max } => vec![by_rowid(table, max)],
+            Way::Index { campaigns } => campaigns
+                .into_iter()
+                .map(|(campaign, max)| by_index(table, campaign, max))
+                .collect(),
             Way::Ends => {
                 let backwards = self.read(table, read::by_key(table, "desc"), rows_max, take);
                 return Ok(backwards.await?.err().map(|_| Lost { rows: None, reason }));
             }
         };
-        let mut rows = 0;
-        for (ask, max) in ranges {
-            rows += self.read_ranges(table, &ask, max, &mut take).await?;
+        let mut rows = Some(0);
+        for numbers in numbered {
+            let lost = self.read_numbered(table, &numbers, &mut take).await?;
+            rows = rows.zip(lost).map(|(before, lost)| before + lost);
         }
         // What only an index had lost is found without it.
-        Ok((rows > 0).then_some(Lost { rows: Some(rows), reason }))
+        Ok((rows != Some(0)).then_some(Lost { rows, reason }))
     }
 
-    /// Reads a table in ranges of numbers, and divides unreadable ranges into halves. Returns how many
-    /// single numbers could not be read.
-    async fn read_ranges<E: From<LibraryError>>(
+    /// Reads numbered rows in ranges. Numbers that do not exist are skipped, so that the effort depends on
+    /// the number of rows and not on the largest number, which may be damaged as well. Returns how many
+    /// single numbers could not be read; `None` if ranges were skipped unread.
+    async fn read_numbered<E: From<LibraryError>>(
+        &self,
+        table: &Table,
+        numbers: &Numbered,
+        mut take: impl AsyncFnMut(Vec<Vec<Cell>>) -> Result<(), E>,
+    ) -> Result<Option<u64>, E> {
+        let (mut lost, mut start, mut unreadable) = (Some(0), 0, 0);
+        let end = numbers.max.saturating_add(1);
+        while start < end {
+            match self.first_from(numbers, start).await? {
+                Ok(None) => break,
+                Ok(Some(first)) => start = start.max(first),
+                Err(_) if unreadable >= RANGES_READ => {
+                    lost = None;
+                    let skipped = 1_i64.checked_shl(unreadable - RANGES_READ);
+                    let skipped = skipped.and_then(|ranges| ranges.checked_mul(TOGETHER));
+                    start = skipped.and_then(|it| start.checked_add(it)).unwrap_or(i64::MAX);
+                    unreadable += 1;
+                    continue;
+                }
+                Err(_) => {}
+            }
+            let range = start..start.saturating_add(TOGETHER);
+            start = range.end;
+            let missing = self.read_range(table, &numbers.rows, range, &mut take).await?;
+            unreadable = if missing == TOGETHER.unsigned_abs() { unreadable + 1 } else { 0 };
+            lost = lost.map(|lost| lost + missing);
+        }
+        Ok(lost)
+    }
+
+    /// The first existing number from `start` on; `None` if there is none. The inner result has the error of
+    /// an unreadable row.
+    async fn first_from<E: From<LibraryError>>(
+        &self,
+        numbers: &Numbered,
+        start: i64,
+    ) -> Result<Result<Option<i64>, LibraryError>, E> {
+        let Some(first) = &numbers.first else { return Ok(Ok(Some(start))) };
+        let found = self.readers().row(first.clone().bind(start)).await;
+        match found.and_then(|row| row.map(|row| row.get("n")).transpose()) {
+            Err(error) if !error.is_of_the_data() => Err(error.into()),
+            found => Ok(found),
+        }
+    }
+
+    /// Reads a range of numbers, and divides unreadable ranges into halves. Returns how many single numbers
+    /// could not be read.
+    async fn read_range<E: From<LibraryError>>(
         &self,
         table: &Table,
         ask: &Statement,
-        max: i64,
+        whole: Range<i64>,
         mut take: impl AsyncFnMut(Vec<Vec<Cell>>) -> Result<(), E>,
     ) -> Result<u64, E> {
         let mut lost = 0;
-        for start in (0..=max).step_by(TOGETHER as usize) {
-            let whole: Range<i64> = start..start + TOGETHER;
-            let mut ranges = vec![whole];
-            while let Some(range) = ranges.pop() {
-                let mut found = Vec::new();
-                let keep = async |rows: Vec<Vec<Cell>>| {
-                    found.extend(rows);
-                    Ok::<(), E>(())
-                };
-                let part = ask.clone().bind(range.start).bind(range.end);
-                match self.read(table, part, usize::MAX, keep).await? {
-                    Ok(()) => take(found).await?,
-                    Err(error) if !error.is_of_the_data() => return Err(error.into()),
-                    Err(_) if range.end - range.start == 1 => lost += 1,
-                    Err(_) => {
-                        let middle = i64::midpoint(range.start, range.end);
-                        ranges.extend([middle..range.end, range.start..middle]);
-                    }
+        let mut ranges = vec![whole];
+        while let Some(range) = ranges.pop() {
+            let mut found = Vec::new();
+            let keep = async |rows: Vec<Vec<Cell>>| {
+                found.extend(rows);
+                Ok::<(), E>(())
+            };
+            let part = ask.clone().bind(range.start).bind(range.end);
+            match self.read(table, part, usize::MAX, keep).await? {
+                Ok(()) => take(found).await?,
+                Err(error) if !error.is_of_the_data() => return Err(error.into()),
+                Err(_) if range.end - range.start == 1 => lost += 1,
+                Err(_) => {
+                    let middle = i64::midpoint(range.start, range.end);
+                    ranges.extend([middle..range.end, range.start..middle]);
                 }
             }
         }
@@ -148,4 +196,24 @@ impl Library {
         }
         None
     }
+}
+
+/// The rows of a table by `rowid`, without use of any index.
+fn by_rowid(table: &Table, max: i64) -> Numbered {
+    let (name, columns) = (table.name, table.column_list());
+    let rows = format!("select {columns} from {name} not indexed where rowid >= $1 and rowid < $2");
+    let first = format!(
+        "select rowid as n from {name} not indexed where rowid >= $1 order by rowid limit 1"
+    );
+    Numbered { rows: sql(rows), first: Some(sql(first)), max }
+}
+
+/// The rows of a campaign by the index of their case.
+fn by_index(table: &Table, campaign: String, max: i64) -> Numbered {
+    let rows = format!(
+        "select {} from {} where campaign_id = $1 and sobol_index >= $2 and sobol_index < $3",
+        table.column_list(),
+        table.name
+    );
+    Numbered { rows: sql(rows).bind(campaign), first: None, max }
 }

@@ -4,6 +4,7 @@ use crate::checksums::salvage;
 use crate::support::{CAMPAIGN, Home, features, finished, lease, report};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 use test_postgres::{Server, Settings};
 use tracktwin_library::{Library, LibraryError};
 
@@ -129,6 +130,46 @@ async fn what_a_lost_page_does_not_hold_is_saved() {
     // Most pages hold results, some 20 cases each; few hold what all others hang from.
     let mostly = all.iter().filter(|saved| **saved >= CASES * 2 / 3).count();
     assert!(mostly * 10 >= sound.pages() * 7, "{mostly} of {} pages: {all:?}", sound.pages());
+}
+
+#[tokio::test]
+async fn a_row_with_a_huge_number_makes_no_rescue_endless() {
+    let sound = Sound::new(CASES).await;
+    let (file, _) = sound.with(|_| ());
+    let last =
+        "update result set rowid = 2400000000000 where rowid = (select max(rowid) from result)";
+    alter(&file, last).await;
+    let root = root_of_results(&file).await;
+    let bytes = fs::read(&file).unwrap();
+    let rescue = async |page: usize| {
+        let mut damaged = bytes.clone();
+        damaged[page * PAGE..][..PAGE].fill(0);
+        let (_, url) = sound.with(|bytes| *bytes = damaged);
+        let saved = tokio::time::timeout(Duration::from_mins(1), saved(&url)).await;
+        saved.expect("it ends")
+    };
+    // The page from which all results are found.
+    assert_eq!(rescue(root).await, Some(0));
+    // The results were written last. Their leaves begin with this byte and have many cells.
+    let leaves = (1..bytes.len() / PAGE).filter(|page| {
+        let head = &bytes[page * PAGE..];
+        head[0] == 0x0d && u16::from_be_bytes([head[3], head[4]]) > 10
+    });
+    for page in leaves.rev().take(2) {
+        let saved = rescue(page).await.unwrap();
+        assert!((CASES * 2 / 3..CASES).contains(&saved), "page {page}: {saved}");
+    }
+}
+
+/// Number of the page, from 0, at which the table of results begins.
+async fn root_of_results(file: &Path) -> usize {
+    use sqlx::Connection as _;
+    let url = format!("sqlite:{}", file.display());
+    let mut connection = sqlx::SqliteConnection::connect(&url).await.unwrap();
+    let ask = "select rootpage from sqlite_schema where name = 'result'";
+    let root: i64 = sqlx::query_scalar(ask).fetch_one(&mut connection).await.unwrap();
+    connection.close().await.unwrap();
+    usize::try_from(root).unwrap() - 1
 }
 
 #[tokio::test]
