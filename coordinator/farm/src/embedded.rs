@@ -266,17 +266,12 @@ impl Outages {
             return Err(error);
         }
         let now = Instant::now();
+        if self.0.is_empty() {
+            tracing::warn!("{error}; waiting for up to {} minutes", OUTAGE_MAX.as_secs() / 60);
+        }
         let known = self.0.get(&call);
-        let since = match known.filter(|it| now.duration_since(it.last) < RESPONDED_AFTER) {
-            Some(outage) => outage.since,
-            None => {
-                if self.0.is_empty() {
-                    let minutes = OUTAGE_MAX.as_secs() / 60;
-                    tracing::warn!("{error}; waiting for up to {minutes} minutes");
-                }
-                now
-            }
-        };
+        let known = known.filter(|it| now.duration_since(it.last) < RESPONDED_AFTER);
+        let since = known.map_or(now, |outage| outage.since);
         self.0.insert(call, Outage { since, last: now });
         if now.duration_since(since) < OUTAGE_MAX { Ok(()) } else { Err(error) }
     }

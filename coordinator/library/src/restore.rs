@@ -60,9 +60,10 @@ impl Write for Restore {
     async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
         let columns = Parameter::ALL.iter().map(|parameter| parameter.name());
         let columns = columns.chain(["surface_seed", "parameter_hash", "drawn"]);
-        let set: String = (3..).zip(columns).map(|(n, name)| format!("{name} = ${n}, ")).collect();
+        let set: Vec<_> = (3..).zip(columns).map(|(n, name)| format!("{name} = ${n}")).collect();
+        let set = set.join(", ");
         let restore = format!(
-            "update campaign_case set {set}
+            "update campaign_case set {set},
                 attempts = case when state = 'failed' then 0 else attempts end,
                 error = case when state = 'failed' then null else error end,
                 state = case when state = 'failed' then 'waiting' else state end

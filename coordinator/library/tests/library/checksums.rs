@@ -199,7 +199,7 @@ on_both_databases! {
 
     async fn a_case_whose_parameters_were_altered_is_given_up_with_the_remedy_and_restored(home: &Home) {
         let library = home.library(CASES).await;
-        let drawn = Some("{\"vehicle.mass_kg\":50.0}".to_owned());
+        let drawn = "{\"vehicle.mass_kg\":50.0}".to_owned();
         alter(home, ALTERED[5]).await;
         let leased = lease(&library, "w", CASES, 0).await;
         let verdicts = report(&library, "w", leased.iter().map(finished).collect()).await;
@@ -214,10 +214,10 @@ on_both_databases! {
         let altered = library.altered_cases(CAMPAIGN).await.unwrap();
         assert_eq!(altered.len(), 1);
         assert_eq!(altered[0].parameter_hash, case(1).parameter_hash());
-        library.restore_cases(CAMPAIGN, vec![(case(1), drawn.clone())]).await.unwrap();
+        library.restore_cases(CAMPAIGN, vec![(case(1), Some(drawn.clone()))]).await.unwrap();
         assert_eq!(library.altered_cases(CAMPAIGN).await.unwrap(), []);
         let ask = "select drawn from campaign_case where sobol_index = 1";
-        assert_eq!(crate::data::ask(&library, ask).await.rows, [[Cell::Text(drawn.unwrap())]]);
+        assert_eq!(crate::data::ask(&library, ask).await.rows, [[Cell::Text(drawn)]]);
         let expected = Status { finished: 2, waiting: 1, ..Status::default() };
         assert_eq!(library.status(CAMPAIGN).await.unwrap(), expected);
         let leased = lease(&library, "w", CASES, 0).await;
