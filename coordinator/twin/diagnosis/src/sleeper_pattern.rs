@@ -15,7 +15,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::f64::consts::{SQRT_2, TAU};
-use tracktwin_signal::recording::{Recording, SleeperWindow};
+use tracktwin_signal::recording::{Pass, Recording, SleeperWindow};
 
 /// Smallest number of spans that tell a pattern from the scatter of the surface.
 const SPANS_MIN: usize = 8;
@@ -120,8 +120,8 @@ impl Measured {
     fn of(recording: &Recording, prepared: &PreparedRecording) -> Self {
         let bands = &prepared.forward.bands;
         let of_speed = |passes: &Vec<usize>| -> Vec<_> {
-            let all: Vec<_> =
-                passes.par_iter().map(|&pass| of_pass(recording, pass, bands)).collect();
+            let passes = passes.par_iter().filter_map(|&pass| recording.passes.get(pass));
+            let all: Vec<_> = passes.map(|pass| of_pass(recording, pass, bands)).collect();
             (0..recording.sleepers.len() - 1).map(|span| mean_of(&all, span)).collect()
         };
         let speeds: Vec<Vec<_>> = prepared.pass_numbers.iter().map(of_speed).collect();
@@ -146,8 +146,7 @@ impl Measured {
 }
 
 /// First harmonic of a pass's log powers, `[span][band]`.
-fn of_pass(recording: &Recording, pass: usize, bands: &Bands) -> Vec<Option<Vec<Complex64>>> {
-    let pass = &recording.passes[pass];
+fn of_pass(recording: &Recording, pass: &Pass, bands: &Bands) -> Vec<Option<Vec<Complex64>>> {
     let width_m = recording.spacing_m / ELEMENTS as f64;
     let windows: Vec<_> = recording
         .sleepers
@@ -231,7 +230,7 @@ mod tests {
     use rand_chacha::rand_core::{Rng, SeedableRng};
     use tracktwin_parameters::Preset;
     use tracktwin_signal::Signal;
-    use tracktwin_signal::recording::{Pass, Sleeper};
+    use tracktwin_signal::recording::Sleeper;
 
     const SPACING_M: f64 = 0.125;
     const RATE_HZ: f64 = 4e4;
