@@ -49,6 +49,11 @@ pub fn owner(sections: &[Range<usize>], sleeper: usize) -> Option<usize> {
     there.reduce(|best, other| if depth(other) > depth(best) { other } else { best })
 }
 
+/// Standard deviation in m of the Gaussian by which a band's wavelet blurs positions, at this centre in Hz.
+pub(crate) fn blur_m(speed_m_s: f64, centre_hz: f64) -> f64 {
+    speed_m_s * CENTRE_RAD / (TAU * centre_hz * SQRT_2)
+}
+
 /// A stretch of sleepers and the track around it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Section {
@@ -151,7 +156,7 @@ impl Section {
     /// a Gaussian. Its standard deviation is the distance that the wheel covers in `6 / (2 pi f sqrt 2)`.
     pub fn window(&self, sleeper: usize, speed_m_s: f64, centre_hz: f64) -> Window {
         let spacing_m = self.track.design.sleeper.spacing_m;
-        let blur_m = speed_m_s * CENTRE_RAD / (TAU * centre_hz * SQRT_2);
+        let blur_m = blur_m(speed_m_s, centre_hz);
         let node_m = spacing_m / ELEMENTS as f64;
         let middle = self.seat_node(sleeper);
         let reach = ((0.5 * spacing_m + BLUR_REACH * blur_m) / node_m).ceil() as usize;

@@ -4,17 +4,17 @@
 //! phase of this pattern tells where the sleepers lie. An error of the odometer that is the same in all passes is
 //! visible in nothing else.
 
-use crate::bands::{Bands, CENTRE_RAD};
+use crate::bands::Bands;
 use crate::baseline::Unknowns;
 use crate::forward::Forward;
 use crate::prepared_recording::PreparedRecording;
-use crate::section::ELEMENTS;
+use crate::section::{ELEMENTS, blur_m};
 use crate::spectra::log_powers;
 use nalgebra::DVector;
 use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
-use std::f64::consts::{SQRT_2, TAU};
+use std::f64::consts::TAU;
 use tracktwin_signal::recording::{Pass, Recording, SleeperWindow};
 
 /// Smallest number of spans that tell a pattern from the scatter of the surface.
@@ -83,8 +83,9 @@ impl SleeperPattern {
             };
             format!(
                 "By the levels within a span, the sleepers lie {:.3} m (± {deviation_m:.3} m) {side} their stated \
-                 positions in all passes, and the estimates belong to places between sleepers. Check the positions; \
-                 if the odometer has this offset, {remedy} `x_m` of every sleeper in recording.json.",
+                 positions in all passes, and the estimates belong to places between sleepers. Check the positions and \
+                 the description of rail and sleepers; if the odometer has this offset, {remedy} `x_m` of every \
+                 sleeper in recording.json.",
                 shift_m.abs()
             )
         })
@@ -208,9 +209,8 @@ impl Forward {
                 first_harmonic((first..first + ELEMENTS).map(|node| power(node).ln()))
             };
             let mean = (0..spans).map(span).sum::<Complex64>() / spans as f64;
-            // The wavelet blurs positions (`Section::window`).
             let centre_hz = self.bands.centres_hz()[band];
-            let blur = self.speeds_m_s[speed] * CENTRE_RAD / (TAU * centre_hz * SQRT_2) / spacing_m;
+            let blur = blur_m(self.speeds_m_s[speed], centre_hz) / spacing_m;
             mean * (-0.5 * (TAU * blur).powi(2)).exp()
         };
         let speeds = 0..self.speeds_m_s.len();

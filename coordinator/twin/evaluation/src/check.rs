@@ -103,10 +103,9 @@ mod tests {
             text.contains("between SN2 and SN3 is 0.145 m, that of the models 0.125 m"),
             "{text}"
         );
-        let gap = |recording: &mut Recording| drop(recording.sleepers.remove(3));
-        let mut listed = same.clone();
-        gap(&mut listed);
-        check_recording(&listed, &TrackDesign::v_track(), &[10.0]).unwrap();
+        let mut with_a_gap = same.clone();
+        with_a_gap.sleepers.remove(3);
+        check_recording(&with_a_gap, &TrackDesign::v_track(), &[10.0]).unwrap();
         let nominal = |part: &str, value: Value| {
             refusal(|recording| drop(recording.nominal.insert(part.to_owned(), value.clone())))
         };

@@ -82,7 +82,7 @@ impl ModelSpeeds {
     /// Speed in km/h at which a pass is evaluated: the stated one, or that of its positions if these differ and models
     /// can evaluate it.
     fn speed_of(&self, pass: &Pass) -> f64 {
-        let by_positions = pass.mean_speed_km_h();
+        let by_positions = 3.6 * pass.mean_speed_m_s();
         let differs = is_misstated(pass) && self.of_pass(by_positions).is_some();
         if differs { by_positions } else { pass.speed_km_h }
     }
@@ -95,7 +95,7 @@ impl ModelSpeeds {
                  at {:.1} km/h. Correct `speed_km_h` or the positions.",
                 pass.file,
                 rounded(pass.speed_km_h, 4),
-                pass.mean_speed_km_h(),
+                3.6 * pass.mean_speed_m_s(),
                 self.speed_of(pass)
             )
         });
@@ -140,7 +140,7 @@ impl ModelSpeeds {
 
 /// Whether the positions of a pass give another speed than stated.
 fn is_misstated(pass: &Pass) -> bool {
-    (pass.mean_speed_km_h() / pass.speed_km_h - 1.0).abs() > SPEED_TOLERANCE
+    (3.6 * pass.mean_speed_m_s() / pass.speed_km_h - 1.0).abs() > SPEED_TOLERANCE
 }
 
 /// Checks that models for the `known` speeds in km/h, ascending, can evaluate a pass of the recording.

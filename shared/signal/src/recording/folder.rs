@@ -62,11 +62,11 @@ pub struct Pass {
 }
 
 impl Pass {
-    /// Mean speed in km/h, from the positions.
-    pub fn mean_speed_km_h(&self) -> f64 {
+    /// Mean speed in m/s, from the positions.
+    pub fn mean_speed_m_s(&self) -> f64 {
         let last = self.position_m.len() - 1;
         let way_m = self.position_m[last] - self.position_m[0];
-        3.6 * way_m / last as f64 * self.signal.sample_rate_hz()
+        way_m / last as f64 * self.signal.sample_rate_hz()
     }
 }
 

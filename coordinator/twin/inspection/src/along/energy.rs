@@ -45,9 +45,7 @@ const ROUNDING: f64 = 0.99;
 
 /// Mean speed of a pass in m/s, from its positions.
 pub(crate) fn speed_m_s(pass: &Pass) -> f64 {
-    let positions = &pass.position_m;
-    let length = positions[positions.len() - 1] - positions[0];
-    length / (positions.len() - 1) as f64 * pass.signal.sample_rate_hz()
+    pass.mean_speed_m_s()
 }
 
 /// Indices of the passes at each speed, the fastest speed first.
