@@ -10,6 +10,10 @@ pub const COHERENCE_MIN: f64 = 0.9;
 /// differ (Shen et al. 2023, Fig. 9). For other tracks both are divided by the length ratio.
 const USUAL_HZ: [f64; 2] = [100.0, 4000.0];
 
+/// Part of an octave on either side, and smallest number of frequencies, over which the coherence is averaged.
+const AVERAGED_OCTAVES: f64 = 1.0 / 12.0;
+const AVERAGED_MIN: usize = 9;
+
 /// Number of fitted frequencies per octave.
 const PER_OCTAVE: f64 = 24.0;
 
@@ -72,6 +76,28 @@ impl PointReceptance {
         ((1.0 - coherence) / (2.0 * coherence * hits)).max(0.0).sqrt()
     }
 
+    /// The coherence without chance, at every frequency: the median over neighbouring frequencies of
+    /// `(n g - 1) / (n - 1)` for the estimate `g` of `n` hits, which noise alone makes `1/n` in the mean.
+    ///
+    /// An estimate of few hits is large where the noise happens to agree with the force. Values that are selected by
+    /// their own estimate are therefore too large.
+    fn settled_coherence(&self) -> Option<Vec<f64>> {
+        let hits = self.hits.filter(|&hits| hits > 1).map(|hits| hits as f64);
+        let unbiased = |&g: &f64| hits.map_or(g, |n| ((n * g - 1.0) / (n - 1.0)).max(0.0));
+        let all: Vec<f64> = self.coherence.as_ref()?.iter().map(unbiased).collect();
+        let hz = &self.frequencies_hz;
+        let median = |index: usize| {
+            let ends = [-AVERAGED_OCTAVES, AVERAGED_OCTAVES].map(f64::exp2);
+            let [from, to] = ends.map(|end| hz.partition_point(|other| *other < hz[index] * end));
+            let from = from.min(index.saturating_sub(AVERAGED_MIN / 2));
+            let to = to.max(index + AVERAGED_MIN / 2 + 1).min(all.len());
+            let mut near = all[from..to].to_vec();
+            let middle = near.len() / 2;
+            *near.select_nth_unstable_by(middle, f64::total_cmp).1
+        };
+        Some((0..all.len()).map(median).collect())
+    }
+
     /// The receptance at the frequencies with these indices.
     pub(crate) fn kept(&self, indices: &[usize]) -> Self {
         Self {
@@ -97,6 +123,7 @@ pub fn select(points: &[PointReceptance], selection: &Selection) -> Selected {
     let (mut inside, mut incoherent, mut unknown) = (0, 0, 0);
     let mut kept_points = Vec::new();
     for point in points {
+        let point = PointReceptance { coherence: point.settled_coherence(), ..point.clone() };
         let count = point.frequencies_hz.len();
         let in_range = |&index: &usize| (low..=high).contains(&point.frequencies_hz[index]);
         let range: Vec<usize> = (0..count).filter(in_range).collect();
@@ -177,6 +204,22 @@ mod tests {
         assert!(notes[0].starts_with("20 of 391 values"), "{notes:?}");
         // 5.3 octaves, less the one that is missing; lines 10 Hz apart are fewer at the low end.
         assert!((80..128).contains(&points[0].values.len()), "{}", points[0].values.len());
+    }
+
+    /// Noise that happens to agree with the force makes a receptance and its coherence too large.
+    #[test]
+    fn a_line_is_not_selected_by_its_own_chance() {
+        let mut point = point(400);
+        let coherence = point.coherence.as_mut().unwrap();
+        // Five hits of a true coherence of 0.8: every fifth estimate is above 0.9.
+        coherence.iter_mut().enumerate().for_each(|(k, it)| *it = 0.72 + 0.06 * (k % 5) as f64);
+        let selection = Selection::usual(&TrackDesign::v_track());
+        assert!(select(&[point.clone()], &selection).points.is_empty());
+        let lower = Selection { coherence: 0.5, ..selection };
+        let kept = select(&[point], &lower).points.remove(0).coherence.unwrap();
+        // The median estimate of 0.84 without its bias: (5 * 0.84 - 1) / 4.
+        let mean = kept.iter().sum::<f64>() / kept.len() as f64;
+        assert!((mean - 0.8).abs() < 0.01, "{mean}");
     }
 
     #[test]

@@ -88,6 +88,17 @@ pub enum ReadFault {
         /// Smallest number of samples.
         least: usize,
     },
+    /// A hit is much shorter than the others at its place.
+    #[error(
+        "the hit has {samples} samples, the others at its place have more, and all would be cut to its length: leave it \
+         out, or record at least {least} samples"
+    )]
+    CutHit {
+        /// Number of samples.
+        samples: usize,
+        /// Smallest number of samples.
+        least: usize,
+    },
     /// The force of a hit is zero.
     #[error("the force of the hit is zero; check the channel of the hammer")]
     NoForce,

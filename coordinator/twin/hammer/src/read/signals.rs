@@ -15,6 +15,10 @@ const REQUIRED: usize = 4;
 
 /// Smallest number of samples of a hit.
 const SAMPLES_MIN: usize = 64;
+
+/// Smallest length of a hit, as a share of the median length at its place.
+const LENGTH_SHARE: f64 = 0.9;
+
 /// Largest relative difference between the mean time steps of two hits.
 const UNEVEN_MAX: f64 = 1e-3;
 /// A time step that differs from the median step by more than this share is a gap; smaller differences come
@@ -75,6 +79,7 @@ pub(super) fn read(text: &str) -> Result<Vec<PointReceptance>, ReadError> {
 /// A hit is transformed as a whole, without a window function, because its record begins and ends at rest.
 fn average(hits: &[Hit]) -> Result<PointReceptance, ReadError> {
     let step_s = step(hits)?;
+    check_lengths(hits)?;
     let samples = hits.iter().map(|hit| hit.force_n.len()).min().unwrap_or_default();
     let transform = tracktwin_fourier::real_forward(samples);
     let spectrum = |signal: &[f64]| {
@@ -124,6 +129,20 @@ fn average(hits: &[Hit]) -> Result<PointReceptance, ReadError> {
         }
     }
     Ok(point)
+}
+
+/// Refuses a hit that is much shorter than the others at its place: all would be cut to its length.
+fn check_lengths(hits: &[Hit]) -> Result<(), ReadError> {
+    let mut lengths: Vec<usize> = hits.iter().map(|hit| hit.force_n.len()).collect();
+    lengths.sort_unstable();
+    let least = (LENGTH_SHARE * lengths[lengths.len() / 2] as f64) as usize;
+    match hits.iter().find(|hit| hit.force_n.len() < least) {
+        Some(hit) => {
+            let fault = ReadFault::CutHit { samples: hit.force_n.len(), least };
+            Err(ReadError { line: hit.line, fault })
+        }
+        None => Ok(()),
+    }
 }
 
 /// The common time step of the hits in s.
@@ -226,6 +245,14 @@ mod tests {
     fn one_hit_has_no_coherence() {
         let points = read(&signals(1, 0.0)).unwrap();
         assert_eq!((points[0].coherence.is_none(), points[0].hits), (true, Some(1)));
+    }
+
+    #[test]
+    fn a_hit_whose_record_ends_early_does_not_cut_the_others() {
+        let text = signals(3, 0.0);
+        let cut: Vec<&str> = text.lines().take(1 + 2 * SAMPLES + 100).collect();
+        let refused = read(&cut.join("\n")).unwrap_err().to_string();
+        assert!(refused.starts_with("line 2050: the hit has 100 samples"), "{refused}");
     }
 
     #[test]
