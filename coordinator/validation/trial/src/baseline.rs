@@ -5,7 +5,7 @@ use crate::place::near;
 use serde::{Deserialize, Serialize};
 use tracktwin_diagnosis::Diagnosis;
 use tracktwin_parameters::{Parameter, Preset};
-use tracktwin_reference_simulator::Scene;
+use tracktwin_reference_simulator::{Hidden, Scene};
 
 /// Deviations of the null simulations above which a cell is visibly anomalous.
 const CELL_DEVIATIONS: f64 = 3.5;
@@ -19,7 +19,7 @@ pub struct Bias {
     pub after: f64,
 }
 
-/// Errors at the sleepers next to hidden effects. All sleepers count if an effect acts everywhere.
+/// Errors at the sleepers next to hidden effects; the truth of a missing railpad is what is left of it. All sleepers count if an effect acts everywhere.
 pub(crate) fn bias(scene: &Scene, diagnosis: &Diagnosis) -> Option<Bias> {
     if scene.left_out.iter().all(is_artefact) {
         return None;
@@ -33,13 +33,25 @@ pub(crate) fn bias(scene: &Scene, diagnosis: &Diagnosis) -> Option<Bias> {
         };
         let error = |value: f64, truth: f64| (value / truth).ln().abs();
         let (railpad, ballast) = (&sleeper.railpad_stiffness, &sleeper.ballast_stiffness);
-        before += error(railpad.before.mean, truth.railpad_stiffness_n_m)
+        let left = scene.left_out.iter().find_map(|it| left_of_railpad(it, number - 1));
+        let true_railpad = left.unwrap_or(truth.railpad_stiffness_n_m);
+        before += error(railpad.before.mean, true_railpad)
             + error(ballast.before.mean, truth.ballast_stiffness_n_m);
-        after += error(railpad.after.mean, truth.railpad_stiffness_n_m)
+        after += error(railpad.after.mean, true_railpad)
             + error(ballast.after.mean, truth.ballast_stiffness_n_m);
         count += 2.0;
     }
     (count > 0.0).then(|| Bias { before: before / count, after: after / count })
+}
+
+/// What a hidden effect leaves of the railpad stiffness of a sleeper, in N/m.
+fn left_of_railpad(hidden: &Hidden, sleeper: usize) -> Option<f64> {
+    match hidden {
+        Hidden::MissingRailpad { sleepers, stiffness_n_per_m } => {
+            sleepers.contains(&sleeper).then_some(*stiffness_n_per_m)
+        }
+        _ => None,
+    }
 }
 
 /// Whether the baseline of every sleeper lies inside the usual ranges of the track: of V-Track, Table D1 of

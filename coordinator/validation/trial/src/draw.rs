@@ -15,8 +15,8 @@ use tracktwin_parameters::Preset;
 use tracktwin_reference_simulator::Scene;
 
 /// Version of the plans and scores. Trials with different versions are not comparable. Version 2 added
-/// makings.
-pub const FORMAT: u32 = 2;
+/// makings, in version 3 clipping has the same share of the crests at every level.
+pub const FORMAT: u32 = 3;
 
 /// Plan of a case of a trial. The seal covers its content.
 #[derive(Clone, Debug, PartialEq, Serialize)]

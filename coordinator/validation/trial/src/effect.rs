@@ -224,7 +224,7 @@ fn sensor_mount_resonance(draw: &mut Draw<'_>) -> Hidden {
 
 fn clipping(draw: &mut Draw<'_>) -> Hidden {
     // Crests at 13 km/h reach 8 m/s2 on a surface of level one.
-    Hidden::Clipping { limit_m_s2: draw.level * draw.log_uniform(1.5, 6.0) }
+    Hidden::Clipping { limit_m_s2: draw.level.sqrt() * draw.log_uniform(1.5, 6.0) }
 }
 
 fn gain_error(draw: &mut Draw<'_>) -> Hidden {
