@@ -2,8 +2,8 @@
 
 use crate::pipeline::compute::compute;
 use crate::pipeline::diagnose::{Compared, DiagnosingError, Setting, diagnose};
-use tracktwin_diagnosis::{ConfirmationError, Confirming, Diagnosis, are_one_speed};
-use tracktwin_inspection::inspect;
+use tracktwin_diagnosis::{ConfirmationError, Confirming, Diagnosis, are_one_speed, short_passes};
+use tracktwin_inspection::{Inspection, inspect};
 use tracktwin_signal::recording::Recording;
 
 /// Errors of confirming a diagnosis.
@@ -42,8 +42,8 @@ pub async fn diagnose_and_confirm(
     watch: &(dyn Fn(&'static str, f64) + Sync),
 ) -> Result<Diagnosis, ConfirmingError> {
     let inspection = compute(|| inspect(recording));
-    let (kept, withheld) =
-        withhold(recording, &inspection.not_compared()).ok_or(ConfirmingError::NoPass)?;
+    let (kept, withheld) = withhold(recording, &not_compared(recording, &inspection))
+        .ok_or(ConfirmingError::NoPass)?;
     let withheld = compute(|| inspection.without_hum(&withheld));
     let diagnosed = diagnose(&kept, setting, watch).await?;
     let mut diagnosis = diagnosed.diagnosis;
@@ -58,8 +58,15 @@ pub async fn diagnose_and_confirm(
 
 /// Whether some speed of a recording has at least two passes that can be compared with a track.
 pub fn has_pass_to_withhold(recording: &Recording) -> bool {
-    let not_compared = compute(|| inspect(recording)).not_compared();
-    !withheld(recording, &not_compared).is_empty()
+    let inspection = compute(|| inspect(recording));
+    !withheld(recording, &not_compared(recording, &inspection)).is_empty()
+}
+
+/// Numbers of the passes that are not compared with a track.
+fn not_compared(recording: &Recording, inspection: &Inspection) -> Vec<usize> {
+    let unfit = inspection.not_compared();
+    let short = short_passes(recording, &unfit);
+    [unfit, short].concat()
 }
 
 /// Numbers of the last pass of each speed that has two or more, among all passes but those with the numbers `except`.

@@ -56,6 +56,7 @@ pub async fn invert(
     let recording = &*inspection.without_hum(recording);
     let recording = &inspection.comparable(recording);
     let prepared = compute(|| sections(recording, track))?;
+    let short = prepared.first().and_then(|it| it.uncovered.note(recording));
     let with_physics = |prepared: PreparedRecording| {
         let known = diagnosis.map(|diagnosis| accepted(diagnosis, recording, &prepared));
         (prepared, known.unwrap_or_default())
@@ -72,7 +73,10 @@ pub async fn invert(
     let progress = |done| watch("fit", done as f64 / count);
     let fitted = fitted_sections::of(started, &null, library, &progress).await?;
     let mut inversion = Inversion::of(recording, &fitted);
-    inversion.notes.extend(left_out);
+    if let Some(diagnosis) = diagnosis {
+        inversion.take_replaced(diagnosis);
+    }
+    inversion.notes.extend(left_out.into_iter().chain(short));
     if diagnosis.is_none() {
         inversion.notes.extend(shown(&inspection));
     }

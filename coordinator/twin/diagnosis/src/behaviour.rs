@@ -51,11 +51,11 @@ pub struct Behaviour {
 }
 
 /// Evidence at a port: gradient and Hessian of the log likelihood with respect to the heights of its basis
-/// functions, and the receptance in m/N to which the heights refer, at the centres in Hz.
+/// functions, and the magnitude of the receptance in m/N to which the heights refer, at the centres in Hz.
 pub(crate) struct PortEvidence<'a> {
     pub(crate) along: &'a DVector<f64>,
     pub(crate) square: &'a DMatrix<f64>,
-    pub(crate) receptance: &'a [Complex64],
+    pub(crate) receptance: &'a [f64],
     pub(crate) centres_hz: &'a [f64],
 }
 
@@ -186,7 +186,7 @@ mod tests {
         let centres_hz: Vec<f64> =
             (0..14).map(|bump| 100.0 * 33_f64.powf(f64::from(bump) / 13.0)).collect();
         // A beam's receptance falls with the frequency.
-        let receptance: Vec<Complex64> = centres_hz.iter().map(|hz| (1e-6 / hz).into()).collect();
+        let receptance: Vec<f64> = centres_hz.iter().map(|hz| 1e-6 / hz).collect();
         let heights = centres_hz.iter().zip(&receptance).flat_map(|(&hz, receptance)| {
             let height = stiffness(hz) * receptance;
             [height.re, height.im]

@@ -177,8 +177,9 @@ fn places(places: Places, section: &Section) -> Vec<Place> {
             single().chain(pairs).collect()
         }
         Places::Points => {
-            let half_span_m = 0.5 * section.track.design.sleeper.spacing_m;
-            let point = |half: usize| Place::Point(section.first_x_m + half as f64 * half_span_m);
+            // Above each sleeper and in the middle of each span.
+            let ends = |half: usize| [half / 2, half.div_ceil(2)].map(|it| section.x_m(it));
+            let point = |half| Place::Point(0.5 * ends(half).iter().sum::<f64>());
             (0..2 * section.sleepers - 1).map(point).collect()
         }
         Places::Patterns => {

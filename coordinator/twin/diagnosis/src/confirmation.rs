@@ -8,7 +8,7 @@
 use crate::calibration::{Calibration, Problem};
 use crate::candidate::Candidate;
 use crate::null_model::{NullError, NullModel, simulated, with_one_wheel};
-use crate::observation::Observation;
+use crate::observation::{Observation, leave_out};
 use crate::outcome::{Confirmation, ConfirmedSpeed};
 use crate::prepared_recording::PreparedRecording;
 use crate::search::{Extent, HELD_OUT_MIN, SearchOutcome};
@@ -79,30 +79,27 @@ impl Confirming<'_> {
         let half = |first: f64| move |share: f64| progress(first + 0.5 * share);
         let before = self.predicted(&[], &self.search.baseline, &half(0.0))?;
         let after = self.predicted(accepted, &self.search.last, &half(0.5))?;
-        // What a pass does not cover counts for nothing.
+        // No pass covers the others; `gain_nats` leaves them out.
         let difference = |predicted: &DVector<f64>| {
             let of_row = |row: usize| measured[row].map_or(0.0, |value| value - predicted[row]);
             DVector::from_fn(predicted.len(), |row, _| of_row(row))
         };
         let [before, after] = [difference(&before), difference(&after)];
-        let covariance = self.covariance_of_a_pass();
-        let observation = Observation::new(DVector::zeros(before.len()), &covariance, |_| false)
-            .ok_or(ConfirmationError::Covariance)?;
         let (sleepers, per_sleeper) = (self.sleepers(), forward.per_sleeper());
         let rows = sleepers.start * per_sleeper..sleepers.end * per_sleeper;
-        let square =
-            |difference| observation.whiten(difference).rows(rows.start, rows.len()).norm_squared();
-        let gain_nats = 0.5 * (square(&before) - square(&after));
+        let is_seen = |row: usize| measured[row].is_some();
+        let covariance = self.covariance_of_a_pass();
+        let gain_nats = gain_nats(&covariance, sleepers.clone(), [&before, &after], is_seen)
+            .ok_or(ConfirmationError::Covariance)?;
         let at_speed = |speed: usize| {
-            let is_seen = |row: &usize| forward.place(*row).1 == speed && measured[*row].is_some();
-            rows.clone().filter(is_seen).collect::<Vec<_>>()
+            rows.clone().filter(|&row| forward.place(row).1 == speed && is_seen(row)).collect()
         };
         let in_db = |difference: &DVector<f64>, rows: &[usize]| {
             let squares: f64 = rows.iter().map(|&row| difference[row].powi(2)).sum();
             DECIBEL * (squares / rows.len() as f64).sqrt()
         };
         let of_speed = |speed: usize| {
-            let rows = at_speed(speed);
+            let rows: Vec<usize> = at_speed(speed);
             (!rows.is_empty()).then(|| ConfirmedSpeed {
                 speed_km_h: 3.6 * forward.speeds_m_s[speed],
                 before_db: in_db(&before, &rows),
@@ -162,5 +159,49 @@ impl Confirming<'_> {
         let all: Vec<Range<usize>> = self.search.accepted.iter().map(of).collect();
         let start = all.iter().map(|range| range.start).min().unwrap_or(0);
         start..all.iter().map(|range| range.end).max().unwrap_or(start)
+    }
+}
+
+/// Gain in log density of the log powers of some sleepers that the withheld passes cover (`is_seen`), from two vectors
+/// of measured minus predicted log powers. `covariance` is that of a sleeper. `None` if it is not positive definite.
+fn gain_nats(
+    covariance: &DMatrix<f64>,
+    mut sleepers: Range<usize>,
+    [before, after]: [&DVector<f64>; 2],
+    is_seen: impl Fn(usize) -> bool,
+) -> Option<f64> {
+    let count = covariance.nrows();
+    let of_sleeper = |sleeper: usize| {
+        let first = sleeper * count;
+        let mut covariance = covariance.clone();
+        (0..count)
+            .filter(|row| !is_seen(first + row))
+            .for_each(|row| leave_out(&mut covariance, row));
+        let observation = Observation::new(DVector::zeros(count), &covariance, |_| false)?;
+        let square = |difference: &DVector<f64>| {
+            observation.whiten(&difference.rows(first, count).into_owned()).norm_squared()
+        };
+        Some(0.5 * (square(before) - square(after)))
+    };
+    sleepers.try_fold(0.0, |sum, sleeper| Some(sum + of_sleeper(sleeper)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_no_withheld_pass_covers_counts_for_nothing() {
+        let covariance = DMatrix::from_row_slice(2, 2, &[0.04, 0.036, 0.036, 0.04]);
+        let before = DVector::from_vec(vec![0.0, 0.4, 0.4, 0.4, 9.0, 9.0]);
+        let after = DVector::zeros(6);
+        let gain = |is_seen: [bool; 6]| {
+            gain_nats(&covariance, 0..3, [&before, &after], |row| is_seen[row]).unwrap()
+        };
+        // Two standard deviations of one value, without the correlation with a value that is missing.
+        assert!((gain([false, true, false, false, false, false]) - 2.0).abs() < 1e-9);
+        // Of two equal values, correlated by 0.9, the second adds little.
+        let both = gain([false, false, true, true, false, false]);
+        assert!((both - 2.0 * 2.0 / 1.9).abs() < 1e-9, "{both}");
     }
 }

@@ -59,8 +59,10 @@ pub use outcome::{
 pub use patch_scan::{Fixed, Patch};
 pub use port_scan::{PortPlace, PortScan, UnknownElement};
 pub use prepared_recording::{
-    PreparationError, PreparedRecording, check_length, check_track, highest_compared_hz,
+    PreparationError, PreparedRecording, Uncovered, check_length, check_track, highest_compared_hz,
+    short_passes,
 };
+pub use profile::WheelTurns;
 pub use quantity::{Common, Own};
 pub use screen::{Template, templates};
 pub use search::{Fitted, Round, SearchOutcome, Stage, first_calibration, search};

@@ -21,6 +21,13 @@ pub struct Observation {
     weights: Vec<f64>,
 }
 
+/// Gives a row of a covariance infinite variance and no correlation: it is not compared.
+pub(crate) fn leave_out(covariance: &mut DMatrix<f64>, row: usize) {
+    covariance.row_mut(row).fill(0.0);
+    covariance.column_mut(row).fill(0.0);
+    covariance[(row, row)] = f64::INFINITY;
+}
+
 impl Observation {
     /// Makes an observation from log powers and the covariance of one sleeper, which is the same for all
     /// sleepers. Rows of a sleeper for which `held_out` is true are not fitted. A row of infinite variance

@@ -6,6 +6,8 @@ use crate::variation::FoundSupportChange;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use tracktwin_inspection::chain::LossOfContact;
+use tracktwin_parameters::Parameter;
+use tracktwin_track::extension::Kind;
 
 /// Value of the field `format` in `diagnosis.json`.
 pub const FORMAT: &str = "tracktwin-diagnosis/1";
@@ -193,6 +195,18 @@ pub struct Hypothesis {
     pub log_evidence: f64,
 }
 
+impl Hypothesis {
+    /// The parameter of an accepted extension that replaces a parameter of the track at the sleeper with this id, such
+    /// as what is left of the stiffness of a missing railpad.
+    pub fn in_place_of(&self, replaced: Parameter, id: &str) -> Option<Estimate> {
+        let location = self.location.as_ref().filter(|_| self.accepted)?;
+        let is_there = location.sleepers.iter().any(|sleeper| sleeper == id);
+        let kind = Kind::from_name(&self.physics).filter(|_| is_there)?;
+        let parameter = kind.parameters.iter().find(|it| it.replaces == Some(replaced))?;
+        self.parameters.get(parameter.name).copied()
+    }
+}
+
 /// A stretch of the track.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Location {
@@ -308,5 +322,27 @@ impl Hypothesis {
             detectability: 9.0,
             log_evidence: 40.0,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_left_of_a_missing_railpad_is_the_railpad_of_its_sleeper() {
+        let at = Location { x_m: [1.0; 2], sleepers: vec!["SN7".to_owned()] };
+        let left = Estimate { mean: 9e6, sd: 2e6 };
+        let mut missing = Hypothesis::accepted("missing_railpad", Some(at.clone()));
+        missing.parameters.insert("stiffness_N_per_m".to_owned(), left);
+        let railpad = |of: &Hypothesis, id: &str| of.in_place_of(Parameter::RailpadStiffness, id);
+        assert_eq!(railpad(&missing, "SN7"), Some(left));
+        assert_eq!(railpad(&missing, "SN8"), None);
+        assert_eq!(missing.in_place_of(Parameter::BallastStiffness, "SN7"), None);
+        assert_eq!(railpad(&Hypothesis { accepted: false, ..missing.clone() }, "SN7"), None);
+        // A layer's stiffness is no railpad's.
+        let mut layer = Hypothesis::accepted("subgrade_layer", Some(at));
+        layer.parameters.clone_from(&missing.parameters);
+        assert_eq!(railpad(&layer, "SN7"), None);
     }
 }

@@ -2,13 +2,14 @@
 
 mod sleepers;
 
-pub use self::sleepers::check_length;
 pub(crate) use self::sleepers::overlapping;
+pub use self::sleepers::{Uncovered, check_length, short_passes};
 
-use self::sleepers::{covered, too_short};
+use self::sleepers::{compared, too_short};
 use crate::bands::Bands;
 use crate::forward::Forward;
 use crate::null_model::NullModel;
+use crate::observation::leave_out;
 use crate::section::Section;
 use crate::spectra::{Spectra, SpeedSpectra, are_one_speed};
 use nalgebra::{DMatrix, DVector};
@@ -124,6 +125,8 @@ pub struct PreparedRecording {
     pub first_sleeper: usize,
     /// Indices in the recording of the passes at each speed.
     pub pass_numbers: Vec<Vec<usize>>,
+    /// What is not compared because not every pass covers all sleepers.
+    pub uncovered: Uncovered,
     /// Names of kinds that may not be accepted.
     pub without: Vec<String>,
     /// Stretches in m in which an inspection of the passes found a shape of the rail; empty before
@@ -168,6 +171,7 @@ struct Measured {
     bands: Bands,
     spectra: Spectra,
     sleepers: Range<usize>,
+    uncovered: Uncovered,
 }
 
 impl Measured {
@@ -177,8 +181,10 @@ impl Measured {
         except: &[usize],
     ) -> Result<Self, PreparationError> {
         check_track(recording, design)?;
-        let compared = recording.passes.iter().enumerate().filter(|(it, _)| !except.contains(it));
-        let fastest = compared.map(|(_, pass)| pass.speed_km_h).fold(0.0, f64::max);
+        let (sleepers, uncovered) = compared(recording, except);
+        let except = &[except, &uncovered.short_passes].concat();
+        let passes = recording.passes.iter().enumerate().filter(|(it, _)| !except.contains(it));
+        let fastest = passes.map(|(_, pass)| pass.speed_km_h).fold(0.0, f64::max);
         let lowest_hz = LOWEST_PERIODS * fastest / 3.6 / design.sleeper.spacing_m;
         let highest_hz = highest_compared_hz(recording.sample_rate_hz);
         let bands = Bands::new(lowest_hz, highest_hz.max(lowest_hz));
@@ -191,12 +197,11 @@ impl Measured {
         if !recording.gain_known() {
             return Err(PreparationError::GainUnknown);
         }
-        let sleepers = covered(recording, except);
         if sleepers.len() < SLEEPERS_MIN {
             return Err(too_short(recording, sleepers.len()));
         }
         let spectra = Spectra::new(recording, &bands, except);
-        Ok(Self { bands, spectra, sleepers })
+        Ok(Self { bands, spectra, sleepers, uncovered })
     }
 
     /// Prepares a range of the sleepers.
@@ -207,11 +212,10 @@ impl Measured {
         sleepers: Range<usize>,
     ) -> PreparedRecording {
         let Self { bands, spectra, .. } = self;
-        let first_x_m = recording.sleepers[sleepers.start].x_m;
-        let section = Section::new(track.clone(), sleepers.len(), first_x_m);
+        let x_m = recording.sleepers[sleepers.clone()].iter().map(|sleeper| sleeper.x_m).collect();
+        let section = Section::at(track.clone(), x_m);
         let reach_m = (0.5 + MARGIN_SPANS) * recording.spacing_m;
-        let last_x_m = recording.sleepers[sleepers.end - 1].x_m;
-        let stretch_m = [first_x_m - reach_m, last_x_m + reach_m];
+        let stretch_m = [section.x_m(0) - reach_m, section.x_m(sleepers.len() - 1) + reach_m];
         let speed = |speed: &SpeedSpectra| true_speed(recording, speed, stretch_m);
         let speeds: Vec<f64> = spectra.speeds.iter().map(speed).collect();
         let noise = spectra.speeds.iter().map(|speed| speed.noise_density).collect();
@@ -226,6 +230,7 @@ impl Measured {
             pass_variance,
             first_sleeper,
             pass_numbers,
+            uncovered: self.uncovered.clone(),
             without,
             detected_shapes_m,
         }
@@ -337,9 +342,7 @@ impl PreparedRecording {
             let (_, speed, band) = forward.place(row);
             let wave_number = TAU * forward.bands.centres_hz()[band] / forward.speeds_m_s[speed];
             if patch.averages_out(wave_number) {
-                covariance.row_mut(row).fill(0.0);
-                covariance.column_mut(row).fill(0.0);
-                covariance[(row, row)] = f64::INFINITY;
+                leave_out(&mut covariance, row);
             }
         }
         covariance

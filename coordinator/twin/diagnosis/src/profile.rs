@@ -22,6 +22,21 @@ const FADE: f64 = 0.3;
 /// Smallest height of a shape in m; a nanometre is below the height of any surface.
 const HEIGHT_MIN_M: f64 = 1e-9;
 
+/// Turns of the wheel in every pass.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WheelTurns {
+    /// Position on the model's track in m at which a turn begins, `[speed][pass]`; empty if unknown.
+    pub starts_m: Vec<Vec<f64>>,
+    /// Circumference of the wheel divided by that of the design.
+    pub circumference_ratio: f64,
+}
+
+impl Default for WheelTurns {
+    fn default() -> Self {
+        Self { starts_m: Vec::new(), circumference_ratio: 1.0 }
+    }
+}
+
 /// Spectrum of a shape over the compared sleepers, `[sleeper][wave]`: squared magnitudes of its Fourier
 /// integral in m4, at integer numbers of waves on [`SAMPLES`]; `None` for sleepers without a shape.
 pub(crate) struct Shape {

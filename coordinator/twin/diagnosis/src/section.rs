@@ -61,17 +61,28 @@ pub struct Section {
     pub track: Track,
     /// Number of compared sleepers.
     pub sleepers: usize,
-    /// Position of the first compared sleeper in m, in the coordinates of the recording.
-    pub first_x_m: f64,
+    /// Positions of the compared sleepers in m, in the coordinates of the recording.
+    pub(crate) sleepers_x_m: Vec<f64>,
     /// Number of spans modelled beyond the first and the last compared sleeper. The continuation of the
     /// track is unknown; distant ends have less effect.
     pub spans_beyond: usize,
 }
 
 impl Section {
-    /// A section of `sleepers` sleepers with the default length of track around it; `first_x_m` in m.
+    /// A section of evenly spaced sleepers with the default length of track around it; `first_x_m` in m.
     pub fn new(track: impl Into<Track>, sleepers: usize, first_x_m: f64) -> Self {
-        Self { track: track.into(), sleepers, first_x_m, spans_beyond: SPANS_BEYOND }
+        let track = track.into();
+        let spacing_m = track.design.sleeper.spacing_m;
+        let x_m = (0..sleepers).map(|sleeper| first_x_m + sleeper as f64 * spacing_m).collect();
+        Self::at(track, x_m)
+    }
+
+    /// A section of sleepers at these positions in m, ascending, with the default length of track around it. The
+    /// model's sleepers are evenly spaced: a position between two sleepers divides the model's span as it divides
+    /// theirs.
+    pub fn at(track: impl Into<Track>, sleepers_x_m: Vec<f64>) -> Self {
+        let (track, sleepers) = (track.into(), sleepers_x_m.len());
+        Self { track, sleepers, sleepers_x_m, spans_beyond: SPANS_BEYOND }
     }
 
     /// Whether the track is V-Track, on which error rates of diagnoses were measured (docs/trial.md).
@@ -124,12 +135,28 @@ impl Section {
 
     /// Position on the model's track, in m, of a position of the recording in m.
     pub fn model_x_m(&self, x_m: f64) -> f64 {
-        x_m - self.first_x_m + self.spans_beyond as f64 * self.track.design.sleeper.spacing_m
+        let spacing_m = self.track.design.sleeper.spacing_m;
+        (self.spans_beyond as f64 + self.spans_from_first(x_m)) * spacing_m
+    }
+
+    /// Number of spans, with fractions, from the first compared sleeper to a position of the recording in m.
+    pub(crate) fn spans_from_first(&self, x_m: f64) -> f64 {
+        let x = &self.sleepers_x_m;
+        let last = x.len() - 1;
+        let spacing_m = self.track.design.sleeper.spacing_m;
+        if x_m <= x[0] {
+            return (x_m - x[0]) / spacing_m;
+        }
+        if x_m >= x[last] {
+            return last as f64 + (x_m - x[last]) / spacing_m;
+        }
+        let next = x.partition_point(|&sleeper_m| sleeper_m <= x_m);
+        (next - 1) as f64 + (x_m - x[next - 1]) / (x[next] - x[next - 1])
     }
 
     /// Position of the middle of a compared sleeper's window, in m of the recording.
     pub fn x_m(&self, sleeper: usize) -> f64 {
-        self.first_x_m + sleeper as f64 * self.track.design.sleeper.spacing_m
+        self.sleepers_x_m[sleeper]
     }
 
     /// Whether two stretches, `[from, to]` in m, are at most a spacing apart.
@@ -193,5 +220,20 @@ mod tests {
         assert_eq!(are([2.0, 2.0], [2.12, 2.12]), [true; 2]);
         assert_eq!(are([2.0, 2.0], [2.13, 2.13]), [false; 2]);
         assert_eq!(are([1.0, 4.0], [2.5, 2.6]), [true; 2]);
+    }
+
+    /// The model's sleepers are evenly spaced, those of the recording are not quite.
+    #[test]
+    fn a_place_lies_between_the_same_sleepers_as_in_the_recording() {
+        let section = Section::at(TrackDesign::v_track(), vec![1.0, 1.13, 1.25, 1.40]);
+        let spans = |x_m: f64| section.spans_from_first(x_m);
+        for (sleeper, x_m) in [1.0, 1.13, 1.25, 1.40].into_iter().enumerate() {
+            assert!((spans(x_m) - sleeper as f64).abs() < 1e-9);
+            assert_eq!(section.x_m(sleeper), x_m);
+            let node_m = section.seat_node(sleeper) as f64 * 0.125 / 8.0;
+            assert!((section.model_x_m(x_m) - node_m).abs() < 1e-9);
+        }
+        assert!((spans(1.065) - 0.5).abs() < 1e-9 && (spans(1.325) - 2.5).abs() < 1e-9);
+        assert!((spans(0.875) + 1.0).abs() < 1e-9 && (spans(1.525) - 4.0).abs() < 1e-9);
     }
 }

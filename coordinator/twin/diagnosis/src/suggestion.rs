@@ -2,6 +2,8 @@
 
 use crate::candidate::{Candidate, parameter};
 use crate::prepared_recording::PreparedRecording;
+use crate::profile::WheelTurns;
+use std::f64::consts::TAU;
 use tracktwin_inspection::{Finding, Inspection, Place};
 use tracktwin_track::extension::{ExtensionInstance, Kind, KindParameter, PlaceKind};
 
@@ -10,12 +12,18 @@ impl PreparedRecording {
     /// rail. Returns the candidates that the inspection suggests.
     pub fn suggested(&mut self, inspection: &Inspection) -> Vec<Candidate> {
         let section = &self.forward.section;
+        let turn_m = inspection.flat.as_ref().map(|flat| flat.circumference_m.0);
+        let design_m = TAU * section.track.design.wheel.radius_m;
         let turn_start_m = |pass: &usize| {
             let blows = inspection.flat.as_ref().and_then(|flat| flat.blows_m.get(*pass));
-            blows.and_then(|blows| blows.first()).map_or(0.0, |&x_m| section.model_x_m(x_m))
+            let start = blows.and_then(|blows| start_m(blows, turn_m?));
+            start.map_or(0.0, |x_m| section.model_x_m(x_m))
         };
         let starts = |passes: &Vec<usize>| passes.iter().map(turn_start_m).collect();
-        self.forward.wheel_starts_m = self.pass_numbers.iter().map(starts).collect();
+        self.forward.wheel_turns = WheelTurns {
+            starts_m: self.pass_numbers.iter().map(starts).collect(),
+            circumference_ratio: turn_m.map_or(1.0, |turn_m| turn_m / design_m),
+        };
         self.detected_shapes_m = inspection
             .findings
             .iter()
@@ -26,6 +34,13 @@ impl PreparedRecording {
         let candidate = |finding| candidate(finding, length_ratio);
         inspection.findings.iter().filter_map(candidate).collect()
     }
+}
+
+/// Position in m of the first blow of a flat, from all blows of a pass and the circumference of the wheel in m.
+fn start_m(blows_m: &[f64], turn_m: f64) -> Option<f64> {
+    let first_m = blows_m.first()?;
+    let turn = |x_m: &f64| x_m - turn_m * ((x_m - first_m) / turn_m).round();
+    Some(blows_m.iter().map(turn).sum::<f64>() / blows_m.len() as f64)
 }
 
 /// Stretch in m in which a finding indicates a shape of the rail.
@@ -64,4 +79,22 @@ fn candidate(finding: &Finding, length_ratio: f64) -> Option<Candidate> {
     };
     let trial = free.iter().map(found).collect();
     Some(Candidate { kind, extension, free, trials: vec![trial], length_ratio })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::start_m;
+
+    #[test]
+    fn all_blows_of_a_pass_say_where_a_turn_begins() {
+        // The third blow is missing, and each is found to 10 mm.
+        let blows_m = [1.01, 3.89, 9.73, 12.59];
+        let start_m = start_m(&blows_m, 2.9).unwrap();
+        assert!((start_m - (1.01 + 0.99 + 1.03 + 0.99) / 4.0).abs() < 1e-9, "{start_m}");
+    }
+
+    #[test]
+    fn a_pass_without_a_blow_says_nothing() {
+        assert_eq!(start_m(&[], 2.9), None);
+    }
 }

@@ -1,7 +1,7 @@
 //! Transfer from the surface under the wheel to the recorded acceleration.
 
 use crate::further_wheels::FurtherWheels;
-use crate::profile::Shape;
+use crate::profile::{Shape, WheelTurns};
 use crate::section::{Section, Window};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -168,14 +168,15 @@ impl Transfer {
         &self.further_wheels
     }
 
-    /// Adds the shapes of rail and wheel over a section. `starts_m` are the positions in m at which a turn
-    /// of the wheel begins: `[speed][pass]`.
-    pub(crate) fn with_shapes(mut self, section: &Section, starts_m: &[Vec<f64>]) -> Self {
+    /// Adds the shapes of rail and wheel over a section.
+    pub(crate) fn with_shapes(mut self, section: &Section, turns: &WheelTurns) -> Self {
         let model = &self.model;
-        let of_pass =
-            |start_m: &f64| Shape::new(section, None, |x_m| model.wheel_profile_m(x_m - start_m));
+        let rolled_m = |x_m: f64, start_m: f64| (x_m - start_m) / turns.circumference_ratio;
+        let of_pass = |&start_m: &f64| {
+            Shape::new(section, None, |x_m| model.wheel_profile_m(rolled_m(x_m, start_m)))
+        };
         let of_speed = |starts: &Vec<f64>| starts.iter().map(of_pass).collect();
-        let wheel = starts_m.iter().map(of_speed).collect::<Option<_>>().unwrap_or_default();
+        let wheel = turns.starts_m.iter().map(of_speed).collect::<Option<_>>().unwrap_or_default();
         let ahead = |distance_m: f64| {
             let patch = model.contact_patch();
             let point = Shape::new(section, None, |x_m| model.point_profile_m(x_m + distance_m));
@@ -228,9 +229,9 @@ impl Transfer {
         self.direct[line][node].norm()
     }
 
-    /// Receptance of the wheel in m/N.
-    pub(crate) fn wheel_receptance(&self, line: usize) -> Complex64 {
-        self.wheel_receptance[line]
+    /// Magnitude of the receptance of the wheel in m/N.
+    pub(crate) fn wheel_receptance(&self, line: usize) -> f64 {
+        self.wheel_receptance[line].norm()
     }
 
     /// Sensitivity of a window's mean power to the dynamic stiffness between wheel and ground, relative to

@@ -9,7 +9,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::sync::LazyLock;
 use tracktwin_diagnosis::{
     Bands, Common, Evidence, Fixed, Forward, NullModel, PortPlace, PreparedRecording,
-    SearchOutcome, Section, Verdict, candidates, search,
+    SearchOutcome, Section, Uncovered, Verdict, candidates, search,
 };
 use tracktwin_inspection::Inspection;
 use tracktwin_parameters::TrackDesign;
@@ -99,6 +99,7 @@ fn recorded_with(
         pass_variance,
         first_sleeper: 0,
         pass_numbers,
+        uncovered: Uncovered::default(),
         without,
         detected_shapes_m,
     };

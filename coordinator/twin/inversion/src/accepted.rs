@@ -1,6 +1,11 @@
 //! Physics that a diagnosis accepted, as a known part of the track model.
 
-use tracktwin_diagnosis::{Candidate, Diagnosis, Hypothesis, Location, PreparedRecording};
+use crate::record::Inversion;
+use tracktwin_diagnosis::{
+    Candidate, Diagnosis, Estimate, Hypothesis, Location, PreparedRecording,
+};
+use tracktwin_evaluation::Flag;
+use tracktwin_parameters::Parameter;
 use tracktwin_signal::recording::Recording;
 use tracktwin_track::extension::{
     Class, EffectFamily, ExtensionInstance, Kind, KindParameter, PlaceKind,
@@ -45,6 +50,24 @@ pub fn accepted(
             Some(Candidate { kind, extension, free, trials: vec![values], length_ratio })
         })
         .collect()
+}
+
+impl Inversion {
+    /// Takes from a diagnosis what replaces a parameter of a sleeper, such as what is left of a missing railpad. The
+    /// recording says nothing on the sleeper's own value, which the fit takes from the neighbours.
+    pub fn take_replaced(&mut self, diagnosis: &Diagnosis) {
+        for sleeper in &mut self.sleepers {
+            let found = |parameter: &Parameter| {
+                diagnosis.hypotheses.iter().find_map(|it| it.in_place_of(*parameter, &sleeper.id))
+            };
+            let replaced: Vec<_> =
+                Parameter::ALL.iter().filter_map(|it| Some((*it, found(it)?))).collect();
+            for (parameter, Estimate { mean, sd }) in replaced {
+                sleeper.estimates.insert(parameter, tracktwin_evaluation::Estimate { mean, sd });
+                sleeper.flags.push(Flag::UnlikeNeighbours);
+            }
+        }
+    }
 }
 
 /// Parameters of a hypothesis that the inversion fits again; none of a force law.

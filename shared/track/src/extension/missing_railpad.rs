@@ -6,6 +6,7 @@ use super::{
 };
 use crate::model::{Assembly, Support};
 use std::sync::Arc;
+use tracktwin_parameters::Parameter;
 
 pub(super) const KIND: Kind = Kind {
     physics: "missing_railpad",
@@ -18,7 +19,8 @@ pub(super) const KIND: Kind = Kind {
     parameters: &[KindParameter::new("stiffness_N_per_m", "N/m", "what stiffness remains")
         .ranges([5e6, 2e7], [2e7, 6e7], 1e7)
         // What carries more is a soft railpad, not a missing one.
-        .slack(0.4)],
+        .slack(0.4)
+        .replaces(Parameter::RailpadStiffness)],
     look_alikes: &["support_variation", "load_dependent_railpad", "cracked_sleeper"],
     would_separate: "a second speed, or a hammer test of the sleeper",
     screening: Screening::tried(&[Family::new(

@@ -7,6 +7,7 @@
 
 mod instance;
 mod kind;
+mod kind_parameter;
 mod measured;
 mod registry;
 mod sampled;
@@ -41,7 +42,8 @@ mod wheel_flat;
 mod wheel_out_of_round;
 
 pub use instance::{ExtensionInstance, Inputs, InstanceError};
-pub use kind::{Bound, Class, EffectFamily, Kind, KindParameter, LookAlikeGroup, PlaceKind};
+pub use kind::{Class, EffectFamily, Kind, LookAlikeGroup, PlaceKind};
+pub use kind_parameter::{Bound, KindParameter};
 pub use measured::Measured;
 pub use registry::{
     CLIPPING, CORRUGATION, CRACKED_SLEEPER, ELECTRICAL_HUM, FLEXIBLE_AXLE_BOX, GAIN_ERROR,

@@ -12,6 +12,7 @@ use crate::spectra::DECIBEL;
 use nalgebra::DVector;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
+use tracktwin_parameters::Parameter;
 
 impl Evidence<'_> {
     pub(super) fn problem<'p>(&'p self, candidates: &'p [Candidate]) -> Problem<'p> {
@@ -125,12 +126,19 @@ impl Evidence<'_> {
                 near_by.map(|index| values[index].exp()).sum::<f64>() / near.len() as f64
             })
         };
+        let mut railpad = mean(Own::RailpadStiffness);
+        let replaced = near.iter().filter_map(|&sleeper| {
+            let at = unknowns.at(Own::RailpadStiffness, sleeper);
+            let fitted = self.search.estimates.values[at].exp();
+            Some(self.replaced_railpad(hypotheses, sleeper)?.mean - fitted)
+        });
+        railpad.after += replaced.sum::<f64>() / near.len() as f64;
         BTreeMap::from([
             ("sleeper_EI_N_m2".to_owned(), common(Common::SleeperBendingStiffness)),
             ("railpad_damping_N_s_m".to_owned(), common(Common::RailpadDamping)),
             ("ballast_damping_N_s_m".to_owned(), common(Common::BallastDamping)),
             ("ballast_stiffness_N_m".to_owned(), mean(Own::BallastStiffness)),
-            ("railpad_stiffness_N_m".to_owned(), mean(Own::RailpadStiffness)),
+            ("railpad_stiffness_N_m".to_owned(), railpad),
             ("irregularity_level".to_owned(), mean(Own::Level)),
         ])
     }
@@ -143,7 +151,14 @@ impl Evidence<'_> {
         flies.then(|| "loss_of_contact".to_owned()).into_iter().collect()
     }
 
-    pub(super) fn track(&self) -> Vec<SleeperValues> {
+    /// What is left of the railpad of a sleeper, if an accepted hypothesis states it.
+    fn replaced_railpad(&self, hypotheses: &[Hypothesis], sleeper: usize) -> Option<Estimate> {
+        let id = self.id(sleeper);
+        hypotheses.iter().find_map(|it| it.in_place_of(Parameter::RailpadStiffness, &id))
+    }
+
+    /// Parameters of every sleeper without and with the accepted physics.
+    pub(super) fn track(&self, hypotheses: &[Hypothesis]) -> Vec<SleeperValues> {
         let unknowns = &self.prepared.forward.unknowns;
         let [before, after] =
             [&self.search.baseline, &self.search.estimates].map(Calibration::moments);
@@ -155,11 +170,16 @@ impl Evidence<'_> {
             let index = unknowns.at(quantity, sleeper);
             BeforeAfter { before: estimate(&before, index), after: estimate(&after, index) }
         };
+        let railpad = |sleeper| {
+            let fitted = both(Own::RailpadStiffness, sleeper);
+            let after = self.replaced_railpad(hypotheses, sleeper).unwrap_or(fitted.after);
+            BeforeAfter { after, ..fitted }
+        };
         (0..self.prepared.forward.section.sleepers)
             .map(|sleeper| SleeperValues {
                 id: self.id(sleeper),
                 x_m: self.prepared.forward.section.x_m(sleeper),
-                railpad_stiffness: both(Own::RailpadStiffness, sleeper),
+                railpad_stiffness: railpad(sleeper),
                 ballast_stiffness: both(Own::BallastStiffness, sleeper),
                 irregularity_level: both(Own::Level, sleeper),
                 flags: self.flags(sleeper),

@@ -104,11 +104,13 @@ impl Evidence<'_> {
         let said = sentence(verdict, &hypotheses, nothing_left_out, &sleepers, &fit, &bias_removed);
         let support_changes = self.support_changes(verdict);
         let loss_of_contact = self.inspection.loss_of_contact.clone();
-        let track = self.track();
+        let track = self.track(&hypotheses);
         let unlike = unlike_neighbours(&track, verdict, &hypotheses);
         let doubts: Vec<String> = unlike.into_iter().chain(self.misplaced()).collect();
-        let sentence =
-            said + &further(&support_changes, loss_of_contact.as_ref()) + &doubts.concat();
+        let sentence = said
+            + &further(&support_changes, loss_of_contact.as_ref())
+            + &doubts.concat()
+            + &self.much_lost();
         let mut notes = self.notes(&hypotheses);
         notes.extend(doubts.iter().map(|doubt| doubt.trim_start().to_owned()));
         Ok(Diagnosis {
@@ -129,6 +131,12 @@ impl Evidence<'_> {
             notes,
             sections: Vec::new(),
         })
+    }
+
+    /// Sentence on sleepers that not every pass covers, with a space before it, if they are many.
+    fn much_lost(&self) -> String {
+        let (lost, compared) = (self.prepared.uncovered.sleepers, self.prepared.sleepers().len());
+        if 2 * lost > compared { format!(" {}", self.lost()) } else { String::new() }
     }
 
     /// Sentence on sleepers that do not lie at their stated positions, with a space before it.

@@ -15,6 +15,9 @@ impl Evidence<'_> {
         let mut notes: Vec<String> =
             self.inspection.pass_defects.iter().map(ToString::to_string).collect();
         notes.extend(self.inspection.notes_on_not_compared(self.recording));
+        let uncovered = &self.prepared.uncovered;
+        notes.extend(uncovered.note(self.recording));
+        notes.extend((uncovered.sleepers > 0).then(|| self.lost()));
         if self.is_one_speed() {
             notes.push(one_speed(3.6 * self.prepared.forward.speeds_m_s[0]));
         }
@@ -29,6 +32,12 @@ impl Evidence<'_> {
         notes.extend(self.speed_disagreement().or_else(|| self.remainder(hypotheses)));
         notes.extend(self.inspection.findings.iter().map(Finding::sentence));
         notes
+    }
+
+    /// Sentence on the sleepers that not every pass covers.
+    pub(super) fn lost(&self) -> String {
+        let last = self.prepared.forward.section.sleepers - 1;
+        self.prepared.uncovered.lost(&self.id(0), &self.id(last))
     }
 
     /// Note on the significant residual after the last search.

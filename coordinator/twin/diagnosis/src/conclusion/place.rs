@@ -7,6 +7,7 @@ use crate::port_scan::PortPlace;
 use nalgebra::DVector;
 use std::ops::Range;
 use tracktwin_inspection::{Finding, Place};
+use tracktwin_signal::recording::Sleeper;
 use tracktwin_track::extension::PlaceKind;
 
 /// Share of the largest squared signature from which a sleeper or band belongs to a mismatch.
@@ -46,21 +47,17 @@ impl Evidence<'_> {
         }
     }
 
-    /// A stretch in m, with the sleepers that are at most half a spacing away, or the nearest one.
+    /// A stretch in m, with the sleepers of the recording that are at most half a spacing away, or the nearest one.
     pub(super) fn location_between(&self, from_m: f64, to_m: f64) -> Location {
-        let section = &self.prepared.forward.section;
-        let half_m = (0.5 + PLACE_ERROR) * section.track.design.sleeper.spacing_m;
-        let near = |sleeper: &usize| {
-            let x_m = section.x_m(*sleeper);
-            from_m - half_m <= x_m && x_m <= to_m + half_m
-        };
-        let mut sleepers: Vec<usize> = (0..section.sleepers).filter(near).collect();
-        if sleepers.is_empty() {
-            let is_before = to_m < section.x_m(0);
-            sleepers.push(if is_before { 0 } else { section.sleepers - 1 });
+        let half_m = (0.5 + PLACE_ERROR) * self.recording.spacing_m;
+        let beyond_m = |it: &&Sleeper| (from_m - it.x_m).max(it.x_m - to_m).max(0.0);
+        let all = || self.recording.sleepers.iter();
+        let mut near: Vec<&Sleeper> = all().filter(|it| beyond_m(it) <= half_m).collect();
+        if near.is_empty() {
+            near.extend(all().min_by(|a, b| beyond_m(a).total_cmp(&beyond_m(b))));
         }
-        let ids = sleepers.into_iter().map(|sleeper| self.id(sleeper));
-        Location { x_m: [from_m, to_m], sleepers: ids.collect() }
+        let sleepers = near.into_iter().map(|sleeper| sleeper.id.clone()).collect();
+        Location { x_m: [from_m, to_m], sleepers }
     }
 
     pub(super) fn location_of_finding(&self, finding: &Finding) -> Option<Location> {

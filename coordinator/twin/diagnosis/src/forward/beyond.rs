@@ -110,7 +110,7 @@ mod tests {
         let plain = forward.log_power(&values, &[]).unwrap();
         // The same track, of which three sleepers more are compared at either end.
         let section =
-            Section { sleepers: 10, first_x_m: 0.625, spans_beyond: 13, ..forward.section.clone() };
+            Section { spans_beyond: 13, ..Section::new(forward.section.track.clone(), 10, 0.625) };
         let wider = Forward::new(section, forward.bands.clone(), &[13.0, 7.0], vec![0.0; 2]);
         let of_wider = wider.unknowns.typical();
         for (column, outer) in forward.unknowns.outer().zip(forward.unknowns.outer_supports()) {

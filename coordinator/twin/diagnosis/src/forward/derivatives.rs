@@ -59,7 +59,7 @@ pub(crate) struct PortColumns {
     /// whole track][line]`.
     pub(crate) seat_receptances: Vec<Vec<f64>>,
     /// Receptance of the wheel in m/N at each line.
-    pub(crate) wheel_receptance: Vec<Complex64>,
+    pub(crate) wheel_receptance: Vec<f64>,
 }
 
 /// State of a track from which derivatives are computed.
@@ -286,6 +286,7 @@ mod tests {
     use super::*;
     use crate::bands::Bands;
     use crate::section::Section;
+    use std::f64::consts::TAU;
     use tracktwin_parameters::TrackDesign;
     use tracktwin_track::element::SpringDamper;
     use tracktwin_track::model::Assembly;
@@ -300,8 +301,12 @@ mod tests {
         let design = TrackDesign::v_track();
         let plain = forward(design.clone());
         let values = plain.unknowns.typical();
-        // `-omega^2 m` is the wheel's own stiffness: a share of it is the same at all frequencies.
-        let mass = vec![-Complex64::ONE; plain.bands.lines_hz().len()];
+        let transfer = plain.transfer(&values, &[], false).unwrap();
+        let of_mass = |(line, hz): (usize, &f64)| {
+            let stiffness = -(TAU * hz).powi(2) * design.wheel.mass_kg;
+            Complex64::from(stiffness * transfer.wheel_receptance(line))
+        };
+        let mass = plain.bands.lines_hz().iter().enumerate().map(of_mass).collect();
         let columns = plain.port_columns(&values, &[], &[mass]).unwrap().wheel;
         let share = 1e-4;
         let mut heavier = design;

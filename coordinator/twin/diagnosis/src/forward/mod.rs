@@ -13,7 +13,7 @@ pub use derivatives::Linearised;
 use self::supports::NEIGHBOURS;
 use crate::bands::Bands;
 use crate::baseline::Unknowns;
-use crate::profile::Shape;
+use crate::profile::{Shape, WheelTurns};
 use crate::quantity::Own;
 use crate::section::{Section, Window};
 use crate::transfer::Transfer;
@@ -38,9 +38,8 @@ pub struct Forward {
     pub unknowns: Unknowns,
     /// One-sided power spectral density of the sensor noise in m2/s3 at each speed.
     pub noise_density: Vec<f64>,
-    /// Position on the model's track in m at which a turn of the wheel begins, `[speed][pass]`; empty if
-    /// unknown.
-    pub wheel_starts_m: Vec<Vec<f64>>,
+    /// Turns of the wheel in every pass.
+    pub wheel_turns: WheelTurns,
     /// Changes of the log powers from the track beyond the compared sleepers, one column for each unknown
     /// of [`Unknowns::beyond`]; zero before [`Forward::allow_beyond`].
     beyond: DMatrix<f64>,
@@ -72,7 +71,7 @@ impl Forward {
         let density = |v: f64, hz: f64| surface.density(TAU * hz / v) * TAU / v;
         let surface =
             speeds_m_s.iter().map(|&v| lines.iter().map(|&hz| density(v, hz)).collect()).collect();
-        let wheel_starts_m = Vec::new();
+        let wheel_turns = WheelTurns::default();
         let rows = section.sleepers * speeds_m_s.len() * bands.count();
         let beyond = DMatrix::zeros(rows, unknowns.beyond().len());
         Self {
@@ -81,7 +80,7 @@ impl Forward {
             speeds_m_s,
             unknowns,
             noise_density,
-            wheel_starts_m,
+            wheel_turns,
             beyond,
             windows,
             surface,
@@ -157,7 +156,7 @@ impl Forward {
         extensions: &[Arc<dyn Extension>],
     ) -> Result<Transfer, ModelError> {
         let transfer = known.with_model(self.model(values, extensions)?, self.bands.lines_hz());
-        Ok(transfer.with_shapes(&self.section, &self.wheel_starts_m))
+        Ok(transfer.with_shapes(&self.section, &self.wheel_turns))
     }
 
     /// Log powers with the force laws active as for the varied values, and everything else as for the given
@@ -175,7 +174,7 @@ impl Forward {
     ) -> Result<Option<DVector<f64>>, ModelError> {
         let model = self.model(varied, extensions)?;
         let transfer = known.with_laws_of(model, self.bands.lines_hz(), alike);
-        let with_shapes = |it: Transfer| it.with_shapes(&self.section, &self.wheel_starts_m);
+        let with_shapes = |it: Transfer| it.with_shapes(&self.section, &self.wheel_turns);
         Ok(transfer.map(with_shapes).map(|transfer| self.levels(&transfer, values)))
     }
 
@@ -211,7 +210,7 @@ impl Forward {
         let model = self.model(values, extensions)?;
         let reach = from_seats.then(|| self.reach_nodes());
         let transfer = Transfer::new(model, self.bands.lines_hz(), reach);
-        Ok(transfer.with_shapes(&self.section, &self.wheel_starts_m))
+        Ok(transfer.with_shapes(&self.section, &self.wheel_turns))
     }
 
     /// Transfer that makes [`Forward::transfer_beside`] fast.

@@ -103,10 +103,12 @@ impl Whole<'_> {
             it.sleepers.iter().filter_map(|id| self.index(id)).collect()
         };
         let (place, further) = (indices(place), indices(further));
-        let (Some(&last), Some(&first)) = (place.last(), further.first()) else { return false };
+        let (Some(&start), Some(&first)) = (place.first(), further.first()) else { return false };
         let step = |of: &[usize]| of.windows(2).map(|pair| pair[1] - pair[0]).max();
         let step = step(&place).max(step(&further)).unwrap_or(0);
-        other.accepted && first <= last + step
+        let is_there =
+            |last: Option<&usize>, first: usize| last.is_some_and(|it| first <= it + step);
+        other.accepted && is_there(place.last(), first) && is_there(further.last(), start)
     }
 
     /// Adds a hypothesis of the next section to a known one.

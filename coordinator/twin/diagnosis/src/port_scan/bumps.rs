@@ -29,10 +29,10 @@ impl Bumps {
     }
 
     /// Weighted mean over each basis function of the values at all lines.
-    pub(super) fn mean(&self, values: &[Complex64]) -> Vec<Complex64> {
+    pub(super) fn mean(&self, values: &[f64]) -> Vec<f64> {
         let mean = |shape: &Vec<Complex64>| {
-            let weighted = shape.iter().zip(values).map(|(weight, value)| weight * value);
-            weighted.sum::<Complex64>() / shape.iter().sum::<Complex64>()
+            let weighted = shape.iter().zip(values).map(|(weight, value)| weight.re * value);
+            weighted.sum::<f64>() / shape.iter().map(|weight| weight.re).sum::<f64>()
         };
         // Every second shape is a bump's real part.
         self.shapes.iter().step_by(2).map(mean).collect()

@@ -5,7 +5,6 @@ use super::prior::Prior;
 use crate::behaviour::{Behaviour, PortEvidence};
 use crate::calibration::Calibration;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
-use num_complex::Complex64;
 
 /// Signature of an unknown dynamic stiffness at one port.
 pub(super) struct Trace {
@@ -15,7 +14,7 @@ pub(super) struct Trace {
     /// part]`.
     pub(super) columns: DMatrix<f64>,
     /// Receptance in m/N to which the heights of the basis functions refer, as mean over each function.
-    pub(super) receptance: Vec<Complex64>,
+    pub(super) receptance: Vec<f64>,
 }
 
 /// Data for the evidence at one port.

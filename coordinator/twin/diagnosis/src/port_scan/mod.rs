@@ -18,7 +18,6 @@ use self::place::seats_together;
 use crate::behaviour::Behaviour;
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use nalgebra::{DMatrix, DVector};
-use num_complex::Complex64;
 use rayon::prelude::*;
 
 /// Evidence for an unknown dynamic stiffness at one port.
@@ -117,11 +116,8 @@ fn traces(
     let columns = problem.forward.port_columns(&current.values, &extensions, &bumps.shapes)?;
     let whiten =
         |columns: DMatrix<f64>| observation.fitted_rows(&observation.whiten_matrix(&columns));
-    let at_seat = |compared: usize| {
-        let magnitudes = &columns.seat_receptances[section.in_track(compared)];
-        let receptance: Vec<Complex64> = magnitudes.iter().map(|&value| value.into()).collect();
-        bumps.mean(&receptance)
-    };
+    let at_seat =
+        |compared: usize| bumps.mean(&columns.seat_receptances[section.in_track(compared)]);
     let seats: Vec<DMatrix<f64>> = columns.seats.into_iter().map(whiten).collect();
     let together = |(compared, in_track): (Vec<usize>, Vec<usize>)| Trace {
         columns: in_track.iter().map(|&sleeper| &seats[sleeper]).sum(),

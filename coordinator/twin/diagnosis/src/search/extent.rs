@@ -20,8 +20,7 @@ impl Extent {
         match (&candidate.extension.sleepers, candidate.extension.x_m) {
             (Some(sleepers), _) => Self::of_sleepers(sleepers, section),
             (None, Some(x_m)) => {
-                let spacing_m = section.track.design.sleeper.spacing_m;
-                let [from, to] = x_m.map(|x_m| (x_m - section.first_x_m) / spacing_m);
+                let [from, to] = x_m.map(|x_m| section.spans_from_first(x_m));
                 Self { from, to }
             }
             (None, None) => Self::everywhere(section),

@@ -160,7 +160,7 @@ mod tests {
             found.unwrap()
         };
         let joint_at = |span: f64| {
-            let x_m = section.first_x_m + span * section.track.design.sleeper.spacing_m;
+            let x_m = section.x_m(0) + span * section.track.design.sleeper.spacing_m;
             let is_there = |at: [f64; 2]| (at[0] - x_m).abs() < 1e-9;
             let is_it = |candidate: &&Candidate| {
                 candidate.kind.physics == "rail_joint"

@@ -142,7 +142,8 @@ fn a_squat_under_the_other_wheel_is_felt_as_in_time() {
         .iter()
         .flat_map(|hz| (0..8).map(move |k| hz * 2_f64.powf((f64::from(k) - 3.5) / 24.0)))
         .collect();
-    let transfer = Transfer::new(model.clone(), &lines_hz, None).with_shapes(&section, &[]);
+    let transfer =
+        Transfer::new(model.clone(), &lines_hz, None).with_shapes(&section, &WheelTurns::default());
     let (_, elsewhere) = &transfer.rail_elsewhere[0];
     let power = |line: usize, sleeper: usize, shape: &Shape, share: f64| {
         let density = shape.density(sleeper, 2.8, lines_hz[line]);
