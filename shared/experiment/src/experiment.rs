@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use tracktwin_parameters::quantity::SPEED;
 use tracktwin_parameters::{DesignAxis, TrackDesign, check_wavelengths};
 use tracktwin_signal::{FeatureDefinition, FeatureError, ThirdOctave};
-use tracktwin_track::extension::SampledExtension;
+use tracktwin_track::extension::{SampledExtension, check_together};
 use tracktwin_track::model::Vehicle;
 
 /// Smallest number of spans between the evaluated stretch and the held ends of the rail.
@@ -125,17 +125,28 @@ impl Experiment {
         for design in self.end_designs() {
             self.check_room(&design)?;
             self.check_steps(&design)?;
-            let mut wheels_m = design.wheel.further_wheels_m.clone();
-            for extension in &self.extensions {
-                for at_end in extension.checked(&design, self.spans)? {
-                    let mut vehicle = Vehicle::rigid(&design.wheel);
-                    at_end.equip(&mut vehicle);
-                    wheels_m.extend(vehicle.further_wheels_m);
-                }
-            }
+            let wheels_m = self.check_extensions(&design)?;
             self.check_wheels(&design, &wheels_m)?;
         }
         Ok(self)
+    }
+
+    /// Checks the extensions at both ends of their ranges. Returns the distances in m of all further wheels.
+    fn check_extensions(&self, design: &TrackDesign) -> Result<Vec<f64>, ExperimentError> {
+        let mut wheels_m = design.wheel.further_wheels_m.clone();
+        let mut built = Vec::new();
+        for extension in &self.extensions {
+            let ends = extension.checked(design, self.spans)?;
+            for at_end in &ends {
+                let mut vehicle = Vehicle::rigid(&design.wheel);
+                at_end.equip(&mut vehicle);
+                wheels_m.extend(vehicle.further_wheels_m);
+            }
+            built.push((extension, ends));
+        }
+        let low = built.iter().map(|(it, [low, _])| (&*it.physics, it.sleepers.as_deref(), &**low));
+        check_together(&low.collect::<Vec<_>>())?;
+        Ok(wheels_m)
     }
 
     /// Reads the canonical JSON of an experiment and checks it.

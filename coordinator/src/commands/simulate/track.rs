@@ -7,7 +7,7 @@ use anyhow::anyhow;
 use serde_json::{Map, Value, json};
 use tracktwin_parameters::{Parameter, ParameterSet, Track, TrackDesign};
 use tracktwin_signal::recording::{self, Sleeper};
-use tracktwin_track::extension::{ExtensionInstance, Kind};
+use tracktwin_track::extension::{ExtensionInstance, Kind, check_together};
 use tracktwin_track::model::{Mesh, Roughness, Support, TrackModel};
 
 /// A track with separate parameters at every sleeper.
@@ -37,6 +37,9 @@ impl SimulatedTrack {
             .map(|instance| instance.build(&design, spans))
             .collect::<Result<_, _>>()
             .or_input()?;
+        let all = instances.iter().zip(&extensions);
+        let all = all.map(|(it, built)| (&*it.physics, it.sleepers.as_deref(), &**built));
+        check_together(&all.collect::<Vec<_>>()).or_input()?;
         let model = TrackModel::build(&design, &mesh, &supports, &extensions).or_input()?;
         let simulated = Self { described, spans, sleepers, extensions: instances, model };
         let [from_m, to_m] = simulated.recorded_m();

@@ -32,13 +32,17 @@ impl File {
         }
         let wheels = &self.vehicle.further_wheels_m;
         let radius_m = self.vehicle.radius_m;
-        let overlaps = |place: &&f64| !place.is_finite() || place.abs() < 2.0 * radius_m;
-        if let Some(place) = wheels.iter().find(overlaps) {
+        let all = || [0.0].iter().chain(wheels);
+        let touches = |(number, place): &(usize, &f64)| {
+            let mut before = all().take(number + 1);
+            !place.is_finite() || before.any(|other| (*place - other).abs() < 2.0 * radius_m)
+        };
+        if let Some((_, place)) = wheels.iter().enumerate().find(touches) {
             return Err(TrackError::Inconsistent {
                 key: "vehicle.further_wheels_m",
                 message: format!(
-                    "a wheel {place} m ahead touches the first one, whose radius is {radius_m} m; \
-                     give the distance of the axles in m"
+                    "a wheel {place} m ahead touches another one; their radius is {radius_m} m; give the distance of \
+                     each axle from the first in m"
                 ),
             });
         }

@@ -29,7 +29,7 @@ pub(super) const KIND: Kind = Kind {
             "1 where the sensor moves with the wheel, 0 where it moves with the axle box",
         )
         .ranges([0.0, 1.0], [0.0, 1.0], 0.0)
-        .bound(Bound::NotNegative)
+        .bound(Bound::Choice)
         .or(0.0),
     ],
     look_alikes: &["rail_cross_section", "sensor_mount_resonance"],
@@ -44,15 +44,11 @@ pub(super) const KIND: Kind = Kind {
         if box_kg >= total {
             return Err(inputs.refuse("mass_kg", "less than the unsprung mass"));
         }
-        let sensor_on_wheel = inputs.value(SENSOR_ON_WHEEL);
-        if sensor_on_wheel != 0.0 && sensor_on_wheel != 1.0 {
-            return Err(inputs.refuse(SENSOR_ON_WHEEL, "0 or 1"));
-        }
         Ok(Arc::new(FlexibleAxleBox {
             box_kg,
             stiffness_n_m: inputs.value("stiffness_N_per_m"),
             damping_n_s_m: inputs.value("damping_N_s_per_m"),
-            sensor_on_wheel: sensor_on_wheel == 1.0,
+            sensor_on_wheel: inputs.value(SENSOR_ON_WHEEL) == 1.0,
         }))
     },
 };

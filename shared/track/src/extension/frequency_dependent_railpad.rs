@@ -105,6 +105,17 @@ mod tests {
         )
     }
 
+    /// The branches of a railpad are multiples of what is left of it.
+    #[test]
+    fn the_order_of_a_list_does_not_matter() {
+        let relaxing = instance("frequency_dependent_railpad")
+            .with("stiffness_ratio", 1.0)
+            .with("relaxation_time_s", 3e-4);
+        let missing = instance("missing_railpad").on([5]).with("stiffness_N_per_m", 1e7);
+        let of = |all: &[_]| direct_receptance(&track(all), ReceptancePoint::Rail(0.75));
+        assert_eq!(of(&[relaxing.clone(), missing.clone()]), of(&[missing, relaxing]));
+    }
+
     #[test]
     fn a_pad_that_relaxes_at_once_is_the_plain_one() {
         let plain = direct_receptance(&track(&[]), ReceptancePoint::Rail(0.75));

@@ -2,7 +2,7 @@
 
 use super::{
     Bound, Class, EffectFamily, Extension, Family, Kind, KindParameter, LookAlikeGroup, PlaceKind,
-    Places, Screening, Trials,
+    Places, Screening, Stage, Trials,
 };
 use crate::element::SpringDamper;
 use crate::model::{Assembly, ForceLaw, Law, Reaction, Support};
@@ -62,8 +62,8 @@ struct HangingSleeper {
 }
 
 impl Extension for HangingSleeper {
-    fn replaces_support(&self) -> bool {
-        true
+    fn stage(&self) -> Stage {
+        Stage::ForceLaw
     }
 
     fn assemble(&self, assembly: &mut Assembly) {

@@ -1,6 +1,6 @@
 //! One extension with its place and the values of its parameters, as written in files.
 
-use super::{Extension, Kind, PlaceKind};
+use super::{Extension, Kind, PlaceKind, Stage};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -76,6 +76,12 @@ pub enum InstanceError {
         /// The violated limit.
         source: QuantityError,
     },
+    /// Two extensions of a kind replace the support of one sleeper.
+    #[error("{physics}: two of them act on one sleeper; give each sleeper one of them")]
+    Twice {
+        /// Name of the kind.
+        physics: String,
+    },
     /// The place is missing, has another [`PlaceKind`] than the kind requires, or is not on the track.
     #[error(
         "{physics}: its place must be {form}, on the track of {length_m} m and {sleepers} sleepers"
@@ -90,6 +96,29 @@ pub enum InstanceError {
         /// Number of sleepers of the track.
         sleepers: usize,
     },
+}
+
+/// Refuses two extensions of a kind that replace the support of one sleeper by a force law. Each extension has its name
+/// and sleepers, `None` for all.
+///
+/// # Errors
+/// [`InstanceError::Twice`].
+pub fn check_together(
+    extensions: &[(&str, Option<&[usize]>, &dyn Extension)],
+) -> Result<(), InstanceError> {
+    let meet = |one: Option<&[usize]>, other: Option<&[usize]>| match (one, other) {
+        (Some(one), Some(other)) => one.iter().any(|sleeper| other.contains(sleeper)),
+        _ => true,
+    };
+    for (number, (physics, sleepers, extension)) in extensions.iter().enumerate() {
+        let mut before = extensions[..number].iter();
+        let is_twice = extension.stage() == Stage::ForceLaw
+            && before.any(|(other, at, _)| other == physics && meet(*at, *sleepers));
+        if is_twice {
+            return Err(InstanceError::Twice { physics: (*physics).to_owned() });
+        }
+    }
+    Ok(())
 }
 
 /// The checked inputs from which a kind is built.
@@ -253,8 +282,10 @@ impl Inputs<'_> {
             PlaceKind::Nowhere => x_m.is_none() && sleepers.is_none(),
             // A diagnosis may say beside the point which sleepers are near it.
             PlaceKind::Point => x_m.is_some_and(|[from, to]| from == to && on_track([from, to])),
-            PlaceKind::Stretch => x_m.is_none_or(|[from, to]| from < to && on_track([from, to])),
-            PlaceKind::Sleepers => sleepers.is_none_or(standing),
+            PlaceKind::Stretch => {
+                sleepers.is_none() && x_m.is_none_or(|[from, to]| from < to && on_track([from, to]))
+            }
+            PlaceKind::Sleepers => x_m.is_none() && sleepers.is_none_or(standing),
         };
         if fits {
             return Ok(());
@@ -277,4 +308,50 @@ fn known_parameters(physics: &str) -> String {
     let parameters = Kind::from_name(physics).map_or(&[][..], |kind| kind.parameters);
     let names: Vec<_> = parameters.iter().map(|parameter| parameter.name).collect();
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tracktwin_parameters::TrackDesign;
+
+    fn refusal(instance: &ExtensionInstance) -> String {
+        instance.build(&TrackDesign::v_track(), 20).unwrap_err().to_string()
+    }
+
+    /// Without its place, the effect would be everywhere.
+    #[test]
+    fn a_place_of_another_form_is_refused() {
+        let pad = ExtensionInstance::new("missing_railpad").with("stiffness_N_per_m", 1e7);
+        let said = refusal(&pad.clone().at([1.5, 1.5]));
+        assert!(said.contains("its place must be sleepers"), "{said}");
+        let waves = ExtensionInstance::new("corrugation")
+            .with("wavelength_m", 0.01)
+            .with("amplitude_m", 1e-6);
+        waves.clone().at([0.5, 1.0]).build(&TrackDesign::v_track(), 20).unwrap();
+        let said = refusal(&waves.on([4, 5]));
+        assert!(said.contains("its place must be a stretch"), "{said}");
+    }
+
+    #[test]
+    fn a_support_is_replaced_once() {
+        let design = TrackDesign::v_track();
+        let gap = |sleepers: &[usize]| {
+            let gap = ExtensionInstance::new("hanging_sleeper").with("gap_m", 1e-4);
+            gap.on(sleepers.iter().copied())
+        };
+        let of = |instances: &[ExtensionInstance]| {
+            let built: Vec<_> = instances.iter().map(|it| it.build(&design, 20).unwrap()).collect();
+            let all = instances.iter().zip(&built);
+            let all = all.map(|(it, built)| (&*it.physics, it.sleepers.as_deref(), &**built));
+            check_together(&all.collect::<Vec<_>>()).map_err(|error| error.to_string())
+        };
+        assert_eq!(of(&[gap(&[3, 4]), gap(&[5])]), Ok(()));
+        assert!(of(&[gap(&[3, 4]), gap(&[4])]).unwrap_err().contains("hanging_sleeper: two"));
+        let everywhere = ExtensionInstance { sleepers: None, ..gap(&[1]) };
+        assert!(of(&[gap(&[3]), everywhere]).is_err());
+        // Springs add.
+        let bolt = ExtensionInstance::new("sleeper_bolt").on([3]).with("stiffness_N_per_m", 1e7);
+        assert_eq!(of(&[bolt.clone(), bolt]), Ok(()));
+    }
 }

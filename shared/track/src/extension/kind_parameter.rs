@@ -22,6 +22,10 @@ pub enum Bound {
     Positive,
     /// At least zero and less than one.
     Share,
+    /// A whole number above zero.
+    Whole,
+    /// Zero or one.
+    Choice,
 }
 
 impl Bound {
@@ -33,6 +37,8 @@ impl Bound {
                 Self::NotNegative => value >= 0.0,
                 Self::Positive => value > 0.0,
                 Self::Share => (0.0..1.0).contains(&value),
+                Self::Whole => value > 0.0 && value.fract() == 0.0,
+                Self::Choice => value == 0.0 || value == 1.0,
             }
     }
 
@@ -43,7 +49,14 @@ impl Bound {
             Self::NotNegative => "zero or more",
             Self::Positive => "more than zero",
             Self::Share => "at least zero and less than one",
+            Self::Whole => "a whole number above zero",
+            Self::Choice => "0 or 1",
         }
+    }
+
+    /// Whether every number between two that satisfy the bound satisfies it.
+    pub const fn is_continuous(self) -> bool {
+        !matches!(self, Self::Whole | Self::Choice)
     }
 }
 
@@ -132,8 +145,8 @@ impl KindParameter {
         let most = if self.v_track == [0.0, 0.0] { SEED_MAX } else { SIZE * most };
         let low = match self.bound {
             Bound::Any => -most,
-            Bound::NotNegative | Bound::Share => 0.0,
-            Bound::Positive => least / SIZE,
+            Bound::NotNegative | Bound::Share | Bound::Choice => 0.0,
+            Bound::Positive | Bound::Whole => least / SIZE,
         };
         let high = if self.bound == Bound::Share { most.min(1.0) } else { most };
         let usual =

@@ -2,7 +2,7 @@
 
 use super::{
     Bound, Class, EffectFamily, Extension, Kind, KindParameter, LookAlikeGroup, PlaceKind,
-    Screening,
+    Screening, Stage,
 };
 use crate::element::SpringDamper;
 use crate::model::{Assembly, ForceLaw, Law, Reaction};
@@ -20,7 +20,7 @@ pub(super) const KIND: Kind = Kind {
         KindParameter::new("exponent", "1", "power of the load with which the stiffness grows")
             .ranges([0.2, 0.7], [0.2, 0.7], 0.4)
             .bound(Bound::Share),
-        KindParameter::new("reference_load_N", "N", "load at which the stiffness is nominal")
+        KindParameter::new("reference_load_N", "N", "load beyond the toe load at which the stiffness is nominal")
             .ranges([500.0, 2500.0], [1.2e4, 6e4], 1000.0)
             .or(1000.0),
         KindParameter::new("toe_load_N", "N", "load from the fastening, without any wheel")
@@ -53,8 +53,8 @@ struct LoadDependentRailpad {
 }
 
 impl Extension for LoadDependentRailpad {
-    fn replaces_support(&self) -> bool {
-        true
+    fn stage(&self) -> Stage {
+        Stage::ForceLaw
     }
 
     fn assemble(&self, assembly: &mut Assembly) {

@@ -2,7 +2,7 @@
 
 use super::{
     Class, EffectFamily, Extension, Family, Kind, KindParameter, LookAlikeGroup, PlaceKind, Places,
-    Screening, Trials,
+    Screening, Stage, Trials,
 };
 use crate::model::{Assembly, Support};
 use std::sync::Arc;
@@ -42,6 +42,10 @@ struct MissingRailpad {
 }
 
 impl Extension for MissingRailpad {
+    fn stage(&self) -> Stage {
+        Stage::Statement
+    }
+
     fn assemble(&self, assembly: &mut Assembly) {
         for &index in &self.sleepers {
             let support = assembly.supports()[index];

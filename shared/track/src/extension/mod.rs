@@ -41,7 +41,7 @@ mod testing;
 mod wheel_flat;
 mod wheel_out_of_round;
 
-pub use instance::{ExtensionInstance, Inputs, InstanceError};
+pub use instance::{ExtensionInstance, Inputs, InstanceError, check_together};
 pub use kind::{Class, EffectFamily, Kind, LookAlikeGroup, PlaceKind};
 pub use kind_parameter::{Bound, KindParameter};
 pub use measured::Measured;
@@ -58,6 +58,20 @@ use crate::model::{Assembly, Vehicle};
 use num_complex::Complex64;
 use std::fmt::Debug;
 
+/// Stage of the assembly at which an extension is added: what uses the values of the supports comes after what changes
+/// them. Extensions of one stage are added in their order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    /// It varies the supports of many sleepers.
+    Variation,
+    /// It states a value of some supports.
+    Statement,
+    /// It adds to the track.
+    Addition,
+    /// It replaces a railpad or ballast by a force law.
+    ForceLaw,
+}
+
 /// Physics that the model of the paper leaves out, or a fault of the measuring chain.
 ///
 /// The default of every method changes nothing. A kind overrides the methods that it needs.
@@ -65,10 +79,9 @@ pub trait Extension: Debug + Send + Sync {
     /// Adds its linear terms, degrees of freedom and force laws to the track being assembled.
     fn assemble(&self, _assembly: &mut Assembly) {}
 
-    /// Whether it replaces a railpad or ballast by a force law. It is then added after all others, which change the
-    /// values that it replaces.
-    fn replaces_support(&self) -> bool {
-        false
+    /// When it is added to the track.
+    fn stage(&self) -> Stage {
+        Stage::Addition
     }
 
     /// Changes the vehicle.

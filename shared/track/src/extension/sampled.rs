@@ -1,6 +1,6 @@
 //! Extensions whose presence and values differ from case to case of a campaign.
 
-use super::{Extension, ExtensionInstance, InstanceError};
+use super::{Extension, ExtensionInstance, InstanceError, Kind};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
@@ -116,12 +116,33 @@ impl SampledExtension {
                 });
             }
         }
+        self.check_whole()?;
         let built = |end: f64| -> Result<Arc<dyn Extension>, InstanceError> {
             let instance = self.instance(&mut || end);
             instance.check_numbers()?;
             instance.build(design, spans)
         };
         Ok([built(0.0)?, built(1.0)?])
+    }
+
+    /// Refuses a range of a parameter that has no value between two of its values.
+    fn check_whole(&self) -> Result<(), InstanceError> {
+        let kind = Kind::from_name(&self.physics);
+        let is_whole = |name: &str| {
+            kind.and_then(|kind| kind.parameter(name)).is_some_and(|it| !it.bound.is_continuous())
+        };
+        let ends = |value: SampledValue| [value.at(0.0), value.at(1.0)];
+        let found = self.parameters.iter().find_map(|(name, &value)| {
+            let [low, high] = ends(value);
+            (low < high && is_whole(name)).then_some((name, high))
+        });
+        let Some((name, value)) = found else { return Ok(()) };
+        Err(InstanceError::Value {
+            physics: self.physics.clone(),
+            parameter: name.clone(),
+            value,
+            form: "one number in all cases, not a range, because only some numbers are possible",
+        })
     }
 
     /// The extension with every value at the relative position in its range that `unit` returns.
@@ -189,6 +210,18 @@ mod tests {
             let refusal = rough.checked(&design, 12).unwrap_err().to_string();
             assert!(refusal.contains("slope_dB_per_octave is"), "{refusal}");
         }
+        // Between two whole numbers there is none.
+        let mut order = voids(0.5);
+        order.physics = "wheel_out_of_round".to_owned();
+        order.sleepers = None;
+        order.parameters = BTreeMap::from([
+            ("order".to_owned(), SampledValue::Between([1.0, 20.0])),
+            ("amplitude_m".to_owned(), SampledValue::Fixed(1e-5)),
+        ]);
+        let refusal = order.checked(&design, 12).unwrap_err().to_string();
+        assert!(refusal.contains("order is 20 but must be one number in all cases"), "{refusal}");
+        order.parameters.insert("order".to_owned(), SampledValue::Between([20.0, 20.0]));
+        order.checked(&design, 12).unwrap();
         let mut twice = voids(0.5);
         twice.sleepers = Some(vec![5, 5]);
         let refusal = twice.checked(&design, 12).unwrap_err().to_string();

@@ -39,8 +39,8 @@ pub(super) const KIND: Kind = Kind {
     )])
     .unless_stated(|design| !design.wheel.further_wheels_m.is_empty()),
     build: |inputs| {
-        if inputs.value("distance_m") == 0.0 {
-            return Err(inputs.refuse("distance_m", "other than zero"));
+        if inputs.value("distance_m").abs() < 2.0 * inputs.design.wheel.radius_m {
+            return Err(inputs.refuse("distance_m", "at least the diameter of the wheel"));
         }
         Ok(Arc::new(SecondWheel { distance_m: inputs.value("distance_m") }))
     },

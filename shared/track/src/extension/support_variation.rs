@@ -2,7 +2,7 @@
 
 use super::{
     Bound, Class, EffectFamily, Extension, Kind, KindParameter, LookAlikeGroup, PlaceKind,
-    Screening,
+    Screening, Stage,
 };
 use crate::model::{Assembly, Support};
 use rand_chacha::ChaCha8Rng;
@@ -59,6 +59,10 @@ struct SupportVariation {
 }
 
 impl Extension for SupportVariation {
+    fn stage(&self) -> Stage {
+        Stage::Variation
+    }
+
     fn assemble(&self, assembly: &mut Assembly) {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         let ballast = self.factors(&mut random, self.ballast_cv);

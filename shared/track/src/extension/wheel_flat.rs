@@ -28,7 +28,7 @@ pub(super) const KIND: Kind = Kind {
         .ranges([0.5, 8.0], [0.5, 8.0], 1.0)
         .or(1.0),
         KindParameter::new("phase_m", "m", "where the flat first meets the rail, from x = 0")
-            .ranges([0.0, 0.41], [0.0, 2.05], 0.0)
+            .ranges([0.0, 0.41], [0.0, 2.89], 0.0)
             .bound(Bound::Any)
             .or(0.0),
     ],

@@ -16,11 +16,9 @@ pub(super) const KIND: Kind = Kind {
     place: PlaceKind::Nowhere,
     measuring_chain: false,
     parameters: &[
-        KindParameter::new("order", "1", "how many waves there are on a turn").ranges(
-            [1.0, 60.0],
-            [1.0, 30.0],
-            20.0,
-        ),
+        KindParameter::new("order", "1", "how many waves there are on a turn")
+            .ranges([1.0, 60.0], [1.0, 30.0], 20.0)
+            .bound(Bound::Whole),
         KindParameter::new("amplitude_m", "m", "amplitude of the waves").ranges(
             [2e-7, 5e-6],
             [1e-5, 1e-3],
@@ -35,9 +33,6 @@ pub(super) const KIND: Kind = Kind {
     would_separate: "more laps: the wheel's waves lie elsewhere on the track in every lap",
     screening: Screening::tried(&[]).suggested(&["amplitude_m"]),
     build: |inputs| {
-        if inputs.value("order").fract() != 0.0 {
-            return Err(inputs.refuse("order", "a whole number of waves a turn"));
-        }
         Ok(Arc::new(WheelOutOfRound {
             wave_number: inputs.value("order") / inputs.design.wheel.radius_m,
             amplitude_m: inputs.value("amplitude_m"),

@@ -10,7 +10,8 @@ use std::ops::Range;
 /// millionth of the distance.
 const HALVINGS: usize = 20;
 
-/// Number of spans on either side of a force law within which a standing wheel can change its state.
+/// Number of spans on either side of a force law within which a standing wheel can change its state. Further wheels are
+/// elsewhere.
 const REACH_SPANS: f64 = 4.0;
 
 /// Which force laws are active.
@@ -85,8 +86,11 @@ impl States {
 fn near(model: &TrackModel) -> Range<usize> {
     let reach_m = REACH_SPANS * model.design().sleeper.spacing_m;
     let laws_m = || model.force_laws().iter().map(|law| law.place_m);
-    let from_m = laws_m().fold(f64::INFINITY, f64::min) - reach_m;
-    let to_m = laws_m().fold(f64::NEG_INFINITY, f64::max) + reach_m;
+    let further_m = || model.vehicle().further_wheels_m.iter().copied();
+    // A wheel behind meets a law when the first one is past it.
+    let from_m = laws_m().fold(f64::INFINITY, f64::min) - reach_m - further_m().fold(0.0, f64::max);
+    let to_m =
+        laws_m().fold(f64::NEG_INFINITY, f64::max) + reach_m - further_m().fold(0.0, f64::min);
     let nodes_m = model.layout().rail_nodes_m();
     let first = nodes_m.partition_point(|x_m| *x_m < from_m);
     first..nodes_m.partition_point(|x_m| *x_m <= to_m).max(first + 1)
@@ -199,15 +203,18 @@ mod tests {
     const ELEMENTS: usize = 8;
 
     fn track(gap_m: Option<f64>) -> TrackModel {
-        let design = TrackDesign::v_track();
+        track_of(&TrackDesign::v_track(), gap_m)
+    }
+
+    fn track_of(design: &TrackDesign, gap_m: Option<f64>) -> TrackModel {
         let supports = vec![Support::from(&ParameterSet::nominal()); SPANS - 1];
         let extension = gap_m.map(|gap_m| {
             let hanging = ExtensionInstance::new("hanging_sleeper").on([9]).with("gap_m", gap_m);
-            hanging.build(&design, SPANS).unwrap()
+            hanging.build(design, SPANS).unwrap()
         });
         let extensions: Vec<Arc<_>> = Vec::from_iter(extension);
         let mesh = Mesh::uniform(SPANS, ELEMENTS, ELEMENTS);
-        TrackModel::build(&design, &mesh, &supports, &extensions).unwrap()
+        TrackModel::build(design, &mesh, &supports, &extensions).unwrap()
     }
 
     fn direct(model: &TrackModel) -> Vec<Complex64> {
@@ -242,6 +249,22 @@ mod tests {
         let shares: Vec<f64> = (0..20).map(|k| open_shares(1.2e-4 + 2e-6 * f64::from(k))).collect();
         let steps: Vec<f64> = shares.windows(2).map(|pair| pair[1] - pair[0]).collect();
         assert!(steps.iter().all(|step| *step > 0.0 && *step < 1.0), "{steps:?}");
+    }
+
+    /// Every wheel of the vehicle presses a hanging sleeper down, not only the first.
+    #[test]
+    fn a_gap_is_closed_under_each_wheel() {
+        let behind_m = -0.8;
+        let mut design = TrackDesign::v_track();
+        design.wheel.further_wheels_m = vec![behind_m];
+        let states = States::new(&track_of(&design, Some(1.6e-4))).unwrap();
+        let is_closed = |node: usize| states.shares[node][0] < 1.0;
+        let seat = 10 * ELEMENTS;
+        let spacing_m = design.sleeper.spacing_m;
+        let later = seat + (-behind_m / spacing_m * ELEMENTS as f64).round() as usize;
+        assert!(is_closed(seat) && is_closed(later));
+        assert!(!is_closed(usize::midpoint(seat, later)));
+        assert!(states.near.contains(&later));
     }
 
     #[test]

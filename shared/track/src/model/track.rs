@@ -68,8 +68,7 @@ pub enum ModelError {
 }
 
 impl TrackModel {
-    /// Assembles the track from one support per sleeper, then adds the extensions in their order. Those that replace a
-    /// support by a force law come last.
+    /// Assembles the track from one support per sleeper, then adds the extensions by their [`Stage`].
     ///
     /// # Errors
     /// [`ModelError`] names the invalid input.
@@ -82,10 +81,10 @@ impl TrackModel {
         check(design, mesh, supports)?;
         let mut assembly = Assembly::new(design, Layout::new(design, mesh), supports);
         let mut vehicle = Vehicle::rigid(&design.wheel);
-        for replaces in [false, true] {
-            for extension in extensions.iter().filter(|it| it.replaces_support() == replaces) {
-                extension.assemble(&mut assembly);
-            }
+        let mut staged: Vec<_> = extensions.iter().collect();
+        staged.sort_by_key(|extension| extension.stage());
+        for extension in staged {
+            extension.assemble(&mut assembly);
         }
         for extension in extensions {
             extension.equip(&mut vehicle);

@@ -74,6 +74,15 @@ pub enum PassError {
     /// The stiffness or inertia matrix is not positive definite: a part of the track is unsupported.
     #[error("the stiffness matrix of the track is not positive definite (unsupported track?)")]
     Unstable,
+    /// The force laws of the track have no equilibrium under the standing vehicle that an iteration finds.
+    #[error(
+        "no equilibrium was found under the vehicle at {position_m} m: too many sleepers hang over gaps, or railpads \
+         cannot carry the load; take fewer sleepers or smaller gaps"
+    )]
+    NoEquilibrium {
+        /// Position of the first wheel in m.
+        position_m: f64,
+    },
     /// The contact force became NaN or infinite.
     #[error("the contact force is not a number at {position_m} m")]
     NotFinite {

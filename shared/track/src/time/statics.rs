@@ -39,17 +39,19 @@ impl<'a> Statics<'a> {
         }
         self.stiffness.solve(&mut track);
         let position_m = places_m.first().copied().unwrap_or_default();
-        self.resist(&mut track).ok_or(PassError::NotFinite { position_m })?;
+        self.resist(&mut track).ok_or(PassError::NoEquilibrium { position_m })?;
         Ok(track)
     }
 
-    /// Motion in m at each force law under a load at a place of the rail.
+    /// Motion in m at each force law under a load on each of the given places of the rail.
     ///
-    /// By Maxwell's reciprocity, without a solution of the track: a load at the place moves a law as a
+    /// By Maxwell's reciprocity, without a solution of the track: a load at a place moves a law as a
     /// force of the law moves the place.
-    fn law_motions(&self, load_n: f64, x_m: f64) -> Option<Vec<f64>> {
-        let place = self.model.layout().rail_point(x_m);
-        let free = self.units.iter().map(|unit| load_n * place.deflection(unit));
+    fn law_motions(&self, load_n: f64, places_m: &[f64]) -> Option<Vec<f64>> {
+        let layout = self.model.layout();
+        let places: Vec<_> = places_m.iter().map(|&x_m| layout.rail_point(x_m)).collect();
+        let deflection = |unit: &Vec<f64>| places.iter().map(|it| it.deflection(unit)).sum::<f64>();
+        let free = self.units.iter().map(|unit| load_n * deflection(unit));
         let (motions, _) = self.resisted(&DVector::from_iterator(self.units.len(), free))?;
         Some(motions.iter().copied().collect())
     }
@@ -76,7 +78,7 @@ impl<'a> Statics<'a> {
     }
 }
 
-/// A track under a standing wheel.
+/// A track under the standing vehicle.
 pub(crate) struct StaticSolution<'a>(Statics<'a>);
 
 impl<'a> StaticSolution<'a> {
@@ -85,10 +87,11 @@ impl<'a> StaticSolution<'a> {
         Statics::new(model).ok().map(Self)
     }
 
-    /// Spring and damper that each force law equals for small motions while the wheel is at `x_m`.
+    /// Spring and damper that each force law equals for small motions while the first wheel is at `x_m`.
     pub(crate) fn tangents(&self, x_m: f64) -> Option<Vec<SpringDamper>> {
         let Self(statics) = self;
-        let motions = statics.law_motions(statics.model.vehicle().wheel.load_n, x_m)?;
+        let load_n = statics.model.vehicle().wheel.load_n;
+        let motions = statics.law_motions(load_n, &self.wheels_m(x_m))?;
         Some(self.tangents_at(motions.into_iter()))
     }
 
@@ -96,8 +99,18 @@ impl<'a> StaticSolution<'a> {
     /// depends on the last digits of this result.
     fn tangents_by_track(&self, x_m: f64) -> Option<Vec<SpringDamper>> {
         let Self(statics) = self;
-        let track = statics.under(statics.model.vehicle().wheel.load_n, &[x_m]).ok()?;
+        let load_n = statics.model.vehicle().wheel.load_n;
+        let track = statics.under(load_n, &self.wheels_m(x_m)).ok()?;
         Some(self.tangents_at(statics.model.force_laws().iter().map(|law| law.port.motion(&track))))
+    }
+
+    /// Places in m of the wheels on the track, with the first wheel at `x_m`.
+    fn wheels_m(&self, x_m: f64) -> Vec<f64> {
+        let Self(statics) = self;
+        let nodes_m = statics.model.layout().rail_nodes_m();
+        let ends_m = nodes_m[0]..=nodes_m[nodes_m.len() - 1];
+        let further = statics.model.vehicle().further_wheels_m.iter().map(|ahead_m| x_m + ahead_m);
+        [x_m].into_iter().chain(further.filter(|place_m| ends_m.contains(place_m))).collect()
     }
 
     fn tangents_at(&self, motions_m: impl Iterator<Item = f64>) -> Vec<SpringDamper> {
@@ -108,7 +121,7 @@ impl<'a> StaticSolution<'a> {
         self.0.model.force_laws().iter().zip(motions_m).map(tangent).collect()
     }
 
-    /// Tangents of each law with the wheel directly above the law.
+    /// Tangents of each law with the first wheel directly above the law.
     pub(crate) fn tangents_above(&self) -> Option<Vec<SpringDamper>> {
         let Self(statics) = self;
         let mut latest: Option<(f64, Vec<SpringDamper>)> = None;
