@@ -20,9 +20,13 @@ pub(super) const KIND: Kind = Kind {
         KindParameter::new("exponent", "1", "power of the load with which the stiffness grows")
             .ranges([0.2, 0.7], [0.2, 0.7], 0.4)
             .bound(Bound::Share),
-        KindParameter::new("reference_load_N", "N", "load beyond the toe load at which the stiffness is nominal")
-            .ranges([500.0, 2500.0], [1.2e4, 6e4], 1000.0)
-            .or(1000.0),
+        KindParameter::new(
+            "reference_load_N",
+            "N",
+            "load beyond the toe load at which the stiffness is nominal",
+        )
+        .ranges([500.0, 2500.0], [1.2e4, 6e4], 1000.0)
+        .or(1000.0),
         KindParameter::new("toe_load_N", "N", "load from the fastening, without any wheel")
             .ranges([100.0, 1000.0], [5e3, 2e4], 400.0)
             .or(400.0),
