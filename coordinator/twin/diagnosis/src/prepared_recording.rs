@@ -2,8 +2,8 @@
 
 mod sleepers;
 
-pub(crate) use self::sleepers::overlapping;
 pub use self::sleepers::{Uncovered, check_length, short_passes};
+pub(crate) use self::sleepers::{covers, overlapping};
 
 use self::sleepers::{compared, too_short};
 use crate::bands::Bands;
@@ -89,13 +89,13 @@ pub enum PreparationError {
              --sleeper"
     )]
     NoSleepers,
-    /// Too few sleepers lie inside every pass.
+    /// Too few sleepers lie inside a pass at every speed.
     #[error(
-        "passes: only {sleepers} neighbouring sleepers lie inside every pass with a margin of \
+        "passes: only {sleepers} neighbouring sleepers lie inside a pass at every speed with a margin of \
          {margin_m:.2} m; a diagnosis needs {SLEEPERS_MIN} or more: record a longer stretch"
     )]
     TooShort {
-        /// Number of sleepers inside every pass.
+        /// Number of sleepers inside a pass at every speed.
         sleepers: usize,
         /// Required margin in m.
         margin_m: f64,
@@ -125,7 +125,9 @@ pub struct PreparedRecording {
     pub first_sleeper: usize,
     /// Indices in the recording of the passes at each speed.
     pub pass_numbers: Vec<Vec<usize>>,
-    /// What is not compared because not every pass covers all sleepers.
+    /// Whether passes at one speed share sleepers.
+    pub passes_repeat: bool,
+    /// What is not compared because no pass at some speed covers it.
     pub uncovered: Uncovered,
     /// Names of kinds that may not be accepted.
     pub without: Vec<String>,
@@ -221,7 +223,8 @@ impl Measured {
         let noise = spectra.speeds.iter().map(|speed| speed.noise_density).collect();
         let forward = Forward::new(section, bands.clone(), &speeds, noise);
         let log_power = log_power(&forward, spectra, sleepers.start);
-        let pass_variance = pass_variance(&forward, spectra);
+        let pass_variance = pass_variance(&forward, spectra, sleepers.clone());
+        let passes_repeat = spectra.speeds.iter().any(|speed| speed.pass_variance().is_some());
         let pass_numbers = spectra.speeds.iter().map(|speed| speed.passes.clone()).collect();
         let (first_sleeper, without, detected_shapes_m) = (sleepers.start, Vec::new(), Vec::new());
         PreparedRecording {
@@ -230,6 +233,7 @@ impl Measured {
             pass_variance,
             first_sleeper,
             pass_numbers,
+            passes_repeat,
             uncovered: self.uncovered.clone(),
             without,
             detected_shapes_m,
@@ -352,15 +356,18 @@ impl PreparedRecording {
 /// Mean speed in km/h of the passes of a speed over a stretch, from their positions, rounded in steps of
 /// [`SPEED_STEP`] from the nominal speed.
 fn true_speed(recording: &Recording, speed: &SpeedSpectra, [from_m, to_m]: [f64; 2]) -> f64 {
-    let of_pass = |&pass: &usize| {
+    let of_pass = |&pass: &usize| -> Option<f64> {
         let pass = &recording.passes[pass];
         let sample = |x_m: f64| pass.position_m.partition_point(|&position| position < x_m);
         let last = pass.position_m.len() - 1;
         let [from, to] = [from_m, to_m].map(|x_m| sample(x_m).min(last));
         let way_m = pass.position_m[to] - pass.position_m[from];
-        3.6 * way_m * pass.signal.sample_rate_hz() / (to - from).max(1) as f64
+        let speed_km_h = 3.6 * way_m * pass.signal.sample_rate_hz() / (to - from).max(1) as f64;
+        // A pass may lie elsewhere.
+        (way_m > 0.0).then_some(speed_km_h)
     };
-    let mean = speed.passes.iter().map(of_pass).sum::<f64>() / speed.passes.len() as f64;
+    let all: Vec<f64> = speed.passes.iter().filter_map(of_pass).collect();
+    let mean = all.iter().sum::<f64>() / all.len() as f64;
     let steps = ((mean / speed.speed_km_h - 1.0) / SPEED_STEP).round();
     speed.speed_km_h * (1.0 + SPEED_STEP * steps)
 }
@@ -377,16 +384,17 @@ fn log_power(forward: &Forward, spectra: &Spectra, first: usize) -> DVector<f64>
     all
 }
 
-/// Variance of the mean over the passes, per speed and band. A single pass at a speed takes the variance of
-/// another speed, or 0.01 if there is none.
-fn pass_variance(forward: &Forward, spectra: &Spectra) -> DVector<f64> {
+/// Variance of the mean over the passes that cover a sleeper, per speed and band, in the mean over some sleepers. Where no
+/// passes at a speed share sleepers, the variance of another speed is taken, or 0.01 if there is none.
+fn pass_variance(forward: &Forward, spectra: &Spectra, sleepers: Range<usize>) -> DVector<f64> {
     let bands = forward.bands.count();
     let known: Vec<_> = spectra.speeds.iter().map(SpeedSpectra::pass_variance).collect();
     let typical = known.iter().flatten().next().cloned().unwrap_or(vec![0.01; bands]);
     let of_speed = |(variance, speed): (&Option<Vec<f64>>, &SpeedSpectra)| {
-        let count = speed.passes.len() as f64;
+        let share = |sleeper: usize| 1.0 / speed.covering(sleeper).count().max(1) as f64;
+        let share = sleepers.clone().map(share).sum::<f64>() / sleepers.len() as f64;
         let variance = variance.as_ref().unwrap_or(&typical);
-        variance.iter().map(|value| value / count).collect::<Vec<_>>()
+        variance.iter().map(|value| share * value).collect::<Vec<_>>()
     };
     DVector::from_vec(known.iter().zip(&spectra.speeds).flat_map(of_speed).collect())
 }

@@ -1,6 +1,7 @@
 //! Measured wavelet power in bands, over every sleeper in every pass.
 
 use crate::bands::{Bands, gain};
+use crate::prepared_recording::covers;
 use num_complex::Complex64;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -16,9 +17,6 @@ pub(crate) const DECIBEL: f64 = 4.342_944_819_032_518;
 
 /// Largest relative difference between the speeds of two passes that count as one speed.
 const SPEED_TOLERANCE: f64 = 0.02;
-
-/// Smallest share of a sleeper's window that a pass must cover.
-const SHARE_MIN: f64 = 0.98;
 
 /// Share of the spectrum up to half the sample rate from which the sensor noise is estimated.
 const NOISE_BAND: Range<f64> = 0.6..0.9;
@@ -46,7 +44,7 @@ pub struct SpeedSpectra {
     /// Indices of the passes in the recording.
     pub passes: Vec<usize>,
     /// Natural logarithm of the mean power in m2/s4, `[pass][sleeper][band]`; `None` if the pass does not
-    /// cover the sleeper's window.
+    /// cover the sleeper's window with a margin.
     pub log_power: Vec<Vec<Option<Vec<f64>>>>,
     /// One-sided power spectral density of the sensor noise in m2/s3, estimated at the highest frequencies;
     /// 0 if the sample rate is so low that they contain the acceleration of the axle box.
@@ -94,8 +92,7 @@ impl SpeedSpectra {
     /// Mean over the passes of the log powers of a sleeper, one value per band; `None` if no pass covers
     /// it.
     pub fn mean(&self, sleeper: usize) -> Option<Vec<f64>> {
-        let covered: Vec<_> =
-            self.log_power.iter().filter_map(|pass| pass[sleeper].as_ref()).collect();
+        let covered: Vec<_> = self.covering(sleeper).collect();
         let first = covered.first()?;
         let mean = |band: usize| {
             covered.iter().map(|power| power[band]).sum::<f64>() / covered.len() as f64
@@ -103,15 +100,20 @@ impl SpeedSpectra {
         Some((0..first.len()).map(mean).collect())
     }
 
+    /// Log powers of the passes that cover a sleeper.
+    pub(crate) fn covering(&self, sleeper: usize) -> impl Iterator<Item = &Vec<f64>> {
+        self.log_power.iter().filter_map(move |pass| pass[sleeper].as_ref())
+    }
+
     /// Variance of one pass's log power about the mean of the passes, one value per band, over all
-    /// sleepers; `None` for a single pass.
+    /// sleepers; `None` if no sleeper is covered by two passes.
     pub fn pass_variance(&self) -> Option<Vec<f64>> {
         let sleepers = self.log_power[0].len();
         let bands = self.log_power.iter().flatten().flatten().next()?.len();
         let (mut sum, mut degrees) = (vec![0.0; bands], 0.0);
         for sleeper in 0..sleepers {
             let Some(mean) = self.mean(sleeper) else { continue };
-            let passes = self.log_power.iter().filter_map(|pass| pass[sleeper].as_ref());
+            let passes = self.covering(sleeper);
             let mut count = 0.0;
             for power in passes {
                 count += 1.0;
@@ -127,10 +129,7 @@ impl SpeedSpectra {
 
 fn pass_powers(recording: &Recording, pass: usize, bands: &Bands) -> Vec<Option<Vec<f64>>> {
     let windows: Vec<_> = (0..recording.sleepers.len())
-        .map(|sleeper| {
-            let covered = recording.window_share(pass, sleeper) >= SHARE_MIN;
-            recording.window(pass, sleeper).filter(|_| covered)
-        })
+        .map(|sleeper| recording.window(pass, sleeper).filter(|_| covers(recording, pass, sleeper)))
         .collect();
     log_powers(&recording.passes[pass].signal, &windows, bands)
 }

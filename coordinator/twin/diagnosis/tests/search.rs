@@ -99,6 +99,7 @@ fn recorded_with(
         pass_variance,
         first_sleeper: 0,
         pass_numbers,
+        passes_repeat: false,
         uncovered: Uncovered::default(),
         without,
         detected_shapes_m,

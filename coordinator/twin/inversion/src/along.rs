@@ -34,7 +34,7 @@ impl Inversion {
         let mut unevaluated = Vec::new();
         for (number, place) in recording.sleepers.iter().enumerate() {
             let Some(section) = owner(&ranges, number) else {
-                let reason = "not every pass covers its window with a margin";
+                let reason = "at some speed no pass covers its window with a margin";
                 unevaluated.push(Unevaluated { id: place.id.clone(), x_m: place.x_m, reason });
                 continue;
             };

@@ -31,7 +31,7 @@ pub struct Inversion {
     pub provenance: Provenance,
     /// The sleepers, along the track.
     pub sleepers: Vec<Sleeper>,
-    /// Sleepers without estimates: not every pass covers their window with a margin.
+    /// Sleepers without estimates: at some speed no pass covers their window with a margin.
     pub unevaluated: Vec<Unevaluated>,
     /// Transitions and soft or stiff spots of the support, along the track.
     pub support_changes: Vec<FoundSupportChange>,

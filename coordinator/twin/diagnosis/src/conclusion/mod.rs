@@ -133,7 +133,7 @@ impl Evidence<'_> {
         })
     }
 
-    /// Sentence on sleepers that not every pass covers, with a space before it, if they are many.
+    /// Sentence on sleepers that are not covered at every speed, with a space before it, if they are many.
     fn much_lost(&self) -> String {
         let (lost, compared) = (self.prepared.uncovered.sleepers, self.prepared.sleepers().len());
         if 2 * lost > compared { format!(" {}", self.lost()) } else { String::new() }
@@ -194,7 +194,7 @@ impl Evidence<'_> {
 
     /// Whether some pass repeats another at its speed.
     fn repeats(&self) -> bool {
-        self.prepared.pass_numbers.iter().any(|passes| passes.len() > 1)
+        self.prepared.passes_repeat
     }
 
     fn hypotheses(&self) -> Vec<Hypothesis> {

@@ -3,14 +3,17 @@
 use super::{MARGIN_SPANS, PreparationError, SLEEPERS_MIN};
 use crate::spectra::are_one_speed;
 use std::ops::Range;
-use tracktwin_signal::recording::{Pass, Recording};
+use tracktwin_signal::recording::Recording;
 
-/// What is not compared because not every pass covers all sleepers.
+/// Smallest share of a sleeper's window that a pass must cover.
+const SHARE_MIN: f64 = 0.98;
+
+/// What is not compared because no pass at some speed covers it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Uncovered {
-    /// Indices of the passes that cover so few sleepers that they are left out.
+    /// Indices of the passes at speeds whose passes cover so few sleepers that they are left out.
     pub short_passes: Vec<usize>,
-    /// Number of sleepers that some of the compared passes cover, and not all.
+    /// Number of sleepers that some of the compared passes cover, but not at every speed.
     pub sleepers: usize,
 }
 
@@ -21,96 +24,111 @@ impl Uncovered {
             self.short_passes.iter().map(|&pass| &*recording.passes[pass].file).collect();
         (!files.is_empty()).then(|| {
             format!(
-                "{}: not compared with the track, because fewer sleepers lie inside than inside the other passes.",
+                "{}: not compared with the track, because fewer sleepers were passed at this speed than at the others.",
                 files.join(", ")
             )
         })
     }
 
-    /// Sentence on the sleepers that not every pass covers, beside the compared ones.
+    /// Sentence on the sleepers that are not covered at every speed, beside the compared ones.
     pub(crate) fn lost(&self, first: &str, last: &str) -> String {
         let sleepers = match self.sleepers {
-            1 => "another sleeper".to_owned(),
-            count => format!("{count} further sleepers"),
+            1 => "another sleeper is".to_owned(),
+            count => format!("{count} further sleepers are"),
         };
-        format!(
-            "Only {first} to {last} were compared; not every pass covers {sleepers} with a margin."
-        )
+        format!("Only {first} to {last} were compared; {sleepers} not covered at every speed.")
     }
 }
 
-/// Passes whose omission gives more compared sleepers, counted once for each pass: those that begin late or end early.
-/// Passes at two speeds are kept, if there are two. The passes with the indices `except` do not count.
+/// Passes of a recording, by speed.
+struct BySpeed<'r> {
+    recording: &'r Recording,
+    /// Indices of the passes at each speed.
+    speeds: Vec<Vec<usize>>,
+}
+
+impl<'r> BySpeed<'r> {
+    /// The passes except those with the indices `except`.
+    fn new(recording: &'r Recording, except: &[usize]) -> Self {
+        let mut speeds: Vec<Vec<usize>> = Vec::new();
+        let speed = |pass: usize| recording.passes[pass].speed_km_h;
+        for pass in (0..recording.passes.len()).filter(|pass| !except.contains(pass)) {
+            match speeds.iter_mut().find(|known| are_one_speed(speed(pass), speed(known[0]))) {
+                Some(known) => known.push(pass),
+                None => speeds.push(vec![pass]),
+            }
+        }
+        Self { recording, speeds }
+    }
+
+    /// The longest run of neighbouring sleepers that some pass covers at every speed.
+    fn covered(&self) -> Range<usize> {
+        let at_speed = |passes: &Vec<usize>, sleeper: usize| {
+            passes.iter().any(|&pass| covers(self.recording, pass, sleeper))
+        };
+        let mut longest = 0..0;
+        let mut start = 0;
+        for sleeper in 0..self.recording.sleepers.len() {
+            if !self.speeds.iter().all(|passes| at_speed(passes, sleeper)) {
+                start = sleeper + 1;
+            } else if sleeper + 1 - start > longest.len() {
+                longest = start..sleeper + 1;
+            }
+        }
+        longest
+    }
+
+    /// Without one speed.
+    fn without(&self, speed: usize) -> Self {
+        let mut speeds = self.speeds.clone();
+        speeds.remove(speed);
+        Self { recording: self.recording, speeds }
+    }
+
+    /// Number of compared sleepers, counted once for each speed.
+    fn data(&self) -> usize {
+        self.speeds.len() * self.covered().len()
+    }
+}
+
+/// Whether a pass covers the window of a sleeper with a margin.
+pub(crate) fn covers(recording: &Recording, pass: usize, sleeper: usize) -> bool {
+    let reach_m = (0.5 + MARGIN_SPANS) * recording.spacing_m;
+    let x_m = recording.sleepers[sleeper].x_m;
+    let positions_m = &recording.passes[pass].position_m;
+    let (first_m, last_m) = (positions_m[0], positions_m[positions_m.len() - 1]);
+    let is_inside = first_m <= x_m - reach_m && x_m + reach_m <= last_m;
+    is_inside && recording.window_share(pass, sleeper) >= SHARE_MIN
+}
+
+/// Passes at speeds without which there are more compared sleepers, counted once for each speed. Two speeds are kept, if
+/// there are two. The passes with the indices `except` do not count.
 pub fn short_passes(recording: &Recording, except: &[usize]) -> Vec<usize> {
+    let mut left = BySpeed::new(recording, except);
     let mut short = Vec::new();
-    loop {
-        let left_out = [except, &short[..]].concat();
-        let left: Vec<usize> =
-            (0..recording.passes.len()).filter(|pass| !left_out.contains(pass)).collect();
-        let compared = |without: &[usize], passes: usize| {
-            passes * covered(recording, &[&left_out, without].concat()).len()
-        };
-        let keeps_speeds = |&&pass: &&usize| {
-            let others: Vec<usize> = left.iter().copied().filter(|&it| it != pass).collect();
-            speeds(recording, &others) >= speeds(recording, &left).min(2)
-        };
-        let candidates = left.iter().filter(keeps_speeds);
-        let best = candidates
-            .map(|&pass| (compared(&[pass], left.len() - 1), pass))
-            .max()
-            .filter(|(count, _)| *count > compared(&[], left.len()));
-        let Some((_, pass)) = best else { break };
-        short.push(pass);
+    while left.speeds.len() > 2 {
+        let fewer = (0..left.speeds.len()).map(|speed| (left.without(speed).data(), speed));
+        let Some((data, speed)) = fewer.max() else { break };
+        if data <= left.data() {
+            break;
+        }
+        short.extend(left.speeds.remove(speed));
     }
     short
 }
 
-/// Number of speeds of some passes.
-fn speeds(recording: &Recording, passes: &[usize]) -> usize {
-    let speed = |pass: usize| recording.passes[pass].speed_km_h;
-    let is_new = |(at, &pass): (usize, &usize)| {
-        passes[..at].iter().all(|&other| !are_one_speed(speed(pass), speed(other)))
-    };
-    passes.iter().enumerate().filter(|&it| is_new(it)).count()
-}
-
-/// Whether a pass covers a sleeper at a position in m with a margin.
-fn covers(recording: &Recording, pass: &Pass, x_m: f64) -> bool {
-    let reach_m = (0.5 + MARGIN_SPANS) * recording.spacing_m;
-    let (first, last) = (pass.position_m[0], pass.position_m[pass.position_m.len() - 1]);
-    first <= x_m - reach_m && x_m + reach_m <= last
-}
-
-/// The compared sleepers, the longest run that every pass covers, and what is not compared. The passes with the indices
-/// `except` do not count.
+/// The compared sleepers, the longest run that some pass covers at every speed, and what is not compared. The passes with
+/// the indices `except` do not count.
 pub(super) fn compared(recording: &Recording, except: &[usize]) -> (Range<usize>, Uncovered) {
     let short_passes = short_passes(recording, except);
-    let left_out = [except, &short_passes].concat();
-    let sleepers = covered(recording, &left_out);
-    let passes = || recording.passes.iter().enumerate().filter(|(it, _)| !left_out.contains(it));
-    let is_covered = |x_m: f64| passes().any(|(_, pass)| covers(recording, pass, x_m));
-    let some = recording.sleepers.iter().filter(|sleeper| is_covered(sleeper.x_m)).count();
+    let passes = BySpeed::new(recording, &[except, &short_passes].concat());
+    let sleepers = passes.covered();
+    let is_covered = |&sleeper: &usize| {
+        passes.speeds.iter().flatten().any(|&pass| covers(recording, pass, sleeper))
+    };
+    let some = (0..recording.sleepers.len()).filter(is_covered).count();
     let uncovered = Uncovered { short_passes, sleepers: some - sleepers.len() };
     (sleepers, uncovered)
-}
-
-/// The longest run of neighbouring sleepers that every pass covers with a margin, without the passes with the indices
-/// `except`.
-fn covered(recording: &Recording, except: &[usize]) -> Range<usize> {
-    let inside = |x_m: f64| {
-        let mut passes = recording.passes.iter().enumerate();
-        passes.all(|(number, pass)| except.contains(&number) || covers(recording, pass, x_m))
-    };
-    let mut longest = 0..0;
-    let mut start = 0;
-    for (number, sleeper) in recording.sleepers.iter().enumerate() {
-        if !inside(sleeper.x_m) {
-            start = number + 1;
-        } else if number + 1 - start > longest.len() {
-            longest = start..number + 1;
-        }
-    }
-    longest
 }
 
 /// Checks that some pass covers enough sleepers, before it is known which passes are compared. A recording without
@@ -122,12 +140,12 @@ pub fn check_length(recording: &Recording) -> Result<(), PreparationError> {
     let passes = 0..recording.passes.len();
     let is_long = |pass: usize| {
         let others: Vec<usize> = passes.clone().filter(|&other| other != pass).collect();
-        covered(recording, &others).len() >= SLEEPERS_MIN
+        BySpeed::new(recording, &others).covered().len() >= SLEEPERS_MIN
     };
     if recording.sleepers.is_empty() || passes.clone().any(is_long) {
         return Ok(());
     }
-    Err(too_short(recording, covered(recording, &[]).len()))
+    Err(too_short(recording, BySpeed::new(recording, &[]).covered().len()))
 }
 
 /// Error of a recording whose compared passes share this number of sleepers.
@@ -148,17 +166,21 @@ pub(crate) fn overlapping(whole: Range<usize>, length: usize, overlap: usize) ->
 mod tests {
     use super::*;
     use tracktwin_signal::Signal;
-    use tracktwin_signal::recording::Sleeper;
+    use tracktwin_signal::recording::{Pass, Sleeper};
 
     /// Passes over `[from, to]` in m at speeds in km/h, with 30 sleepers every 0.1 m from 0.1 m.
     fn recording(passes: &[(f64, [f64; 2])]) -> Recording {
-        let pass = |&(speed_km_h, ends_m): &(f64, [f64; 2])| Pass {
-            file: format!("{speed_km_h}"),
-            speed_km_h,
-            axle: None,
-            signal: Signal::new(1e3, vec![0.0; 2]).unwrap(),
-            position_m: ends_m.to_vec(),
-            contact_loss_share: None,
+        let pass = |&(speed_km_h, [from_m, to_m]): &(f64, [f64; 2])| {
+            let position_m: Vec<f64> =
+                (0..=(1e3 * (to_m - from_m)) as usize).map(|n| from_m + 1e-3 * n as f64).collect();
+            Pass {
+                file: format!("{speed_km_h}"),
+                speed_km_h,
+                axle: None,
+                signal: Signal::new(1e3, vec![0.0; position_m.len()]).unwrap(),
+                position_m,
+                contact_loss_share: None,
+            }
         };
         let sleeper =
             |number: u32| Sleeper { id: number.to_string(), x_m: 0.1 * f64::from(number) };
@@ -174,26 +196,39 @@ mod tests {
         }
     }
 
+    const WHOLE: [f64; 2] = [-1.0, 4.0];
+    const SHORT: [f64; 2] = [-1.0, 1.05];
+
+    fn of(passes: &[(f64, [f64; 2])]) -> (Range<usize>, Uncovered) {
+        compared(&recording(passes), &[])
+    }
+
+    /// A pass is split where its data have a gap.
     #[test]
-    fn a_short_pass_does_not_cut_the_track_of_the_others() {
-        let (whole, short) = ([-1.0, 4.0], [-1.0, 1.05]);
-        let of = |passes: &[(f64, [f64; 2])]| compared(&recording(passes), &[]);
+    fn a_sleeper_needs_a_pass_at_every_speed_and_not_every_pass() {
         let none = Uncovered::default();
-        assert_eq!(of(&[(7.0, whole), (10.0, whole)]), (0..30, none.clone()));
+        assert_eq!(of(&[(7.0, WHOLE), (10.0, WHOLE)]), (0..30, none.clone()));
+        assert_eq!(of(&[(7.0, WHOLE), (7.0, SHORT), (10.0, WHOLE)]), (0..30, none.clone()));
+        let halves = [(7.0, [-1.0, 1.5]), (7.0, [1.52, 4.0])];
+        let gap = Uncovered { short_passes: Vec::new(), sleepers: 16 };
+        assert_eq!(of(&[halves[0], halves[1], (10.0, WHOLE)]), (16..30, gap));
+        assert_eq!(of(&[halves[0], halves[1], (7.0, WHOLE), (10.0, WHOLE)]), (0..30, none));
+    }
+
+    #[test]
+    fn a_speed_with_short_passes_does_not_cut_the_track_of_the_others() {
         let left_out = Uncovered { short_passes: vec![1], sleepers: 0 };
-        assert_eq!(of(&[(7.0, whole), (7.0, short), (10.0, whole)]), (0..30, left_out.clone()));
-        // Another speed does not outweigh two thirds of the sleepers.
-        assert_eq!(of(&[(7.0, whole), (13.0, short), (10.0, whole)]), (0..30, left_out));
+        assert_eq!(of(&[(7.0, WHOLE), (13.0, SHORT), (10.0, WHOLE)]), (0..30, left_out));
         // Of two speeds none is left out, and it is known what is lost.
         let lost = Uncovered { short_passes: Vec::new(), sleepers: 21 };
-        assert_eq!(of(&[(7.0, whole), (10.0, short)]), (0..9, lost));
-        // A pass that is a little shorter says more than the sleepers that it lacks.
+        assert_eq!(of(&[(7.0, WHOLE), (10.0, SHORT)]), (0..9, lost));
+        // A speed whose passes are a little shorter says more than the sleepers that it lacks.
         let little = Uncovered { short_passes: Vec::new(), sleepers: 3 };
         let some = [-1.0, 2.85];
-        assert_eq!(of(&[(7.0, whole), (7.0, some), (10.0, whole)]), (0..27, little));
+        assert_eq!(of(&[(7.0, WHOLE), (13.0, some), (10.0, WHOLE)]), (0..27, little));
         // A pass that the inspection left out does not count.
-        let both = recording(&[(7.0, short), (7.0, whole), (10.0, whole)]);
-        assert_eq!(compared(&both, &[0]), (0..30, none));
+        let both = recording(&[(7.0, SHORT), (7.0, WHOLE), (10.0, WHOLE)]);
+        assert_eq!(compared(&both, &[1]).0, 0..9);
     }
 
     #[test]
