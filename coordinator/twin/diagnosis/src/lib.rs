@@ -72,7 +72,7 @@ pub use sleeper_pattern::SleeperPattern;
 pub use spectra::{Spectra, SpeedSpectra, are_one_speed};
 pub use tracktwin_inspection::separate_wavelengths;
 pub use variation::{
-    Amplitude, BALLAST_ERROR, Exception, FoundSupportChange, Quadratic, SupportChange,
-    SupportChangeKind, Variation, expect_variation, joined_support_changes, learn_railpad_damping,
-    learn_variation,
+    Amplitude, BALLAST_ERROR, EXCEPTION_NATS, Exception, FoundSupportChange, Quadratic,
+    SupportChange, SupportChangeKind, Variation, expect_variation, joined_support_changes,
+    learn_railpad_damping, learn_variation,
 };

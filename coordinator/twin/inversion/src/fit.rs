@@ -1,5 +1,6 @@
 //! The fit of one section of track.
 
+use crate::soft::add_soft_sleepers;
 use nalgebra::{DMatrix, DVector};
 use tracktwin_diagnosis::{
     Amplitude, BALLAST_ERROR, Calibration, CalibrationError, Candidate, Forward, Mean, NullModel,
@@ -114,6 +115,9 @@ pub fn fit(
         start.rows_mut(0, best.len()).copy_from(&best);
         calibration = fit(&forward, &factors, start)?;
     }
+    let observation = &plain.clone().with_factors(&factors);
+    let problem = Problem { forward: &prepared.forward, observation, candidates: known };
+    add_soft_sleepers(&problem, &mut forward, &mut calibration)?;
     let valley =
         along_valley(|forward, start| fit(forward, &factors, start), &forward, &calibration)?;
     let posterior = Posterior::mixture(&valley);

@@ -44,6 +44,7 @@ mod beside;
 mod files;
 mod fit;
 mod record;
+mod soft;
 mod stored;
 
 pub use accepted::{accepted, modelled};

@@ -27,7 +27,7 @@ const ROUNDS: usize = 6;
 
 /// Increase of the log evidence, in nats, that an exception needs: its prior probability is about one in a
 /// hundred sleepers.
-const EXCEPTION_NATS: f64 = 5.0;
+pub const EXCEPTION_NATS: f64 = 5.0;
 
 /// Largest number of exceptions in one quantity, as a share of all sleepers.
 const EXCEPTIONS_MAX: f64 = 0.2;

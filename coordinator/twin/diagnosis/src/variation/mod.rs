@@ -8,7 +8,7 @@ mod railpad_damping;
 pub use change::{
     Amplitude, BALLAST_ERROR, FoundSupportChange, SupportChangeKind, joined_support_changes,
 };
-pub use learn::{expect_variation, learn_variation};
+pub use learn::{EXCEPTION_NATS, expect_variation, learn_variation};
 pub use quadratic::Quadratic;
 pub use railpad_damping::learn_railpad_damping;
 
