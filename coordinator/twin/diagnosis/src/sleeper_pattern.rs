@@ -28,15 +28,26 @@ const AMPLITUDE_MAX: f64 = 1.4;
 const CONTRAST_MIN: f64 = 4.0;
 
 /// Distance of the sleepers from their stated positions that is an error, as a share of the spacing, and in standard
-/// deviations.
+/// deviations. Stated distances are wrong if the first and the last sleeper are that far away.
 const OFFSET_MIN: f64 = 0.1;
 const DEVIATIONS_MIN: f64 = 3.0;
+
+/// Largest error of the stated distances that is searched, as a share of them.
+const SCALE_MAX: f64 = 0.03;
+
+/// Number of tried scales times spans in which the phase of the pattern turns once.
+const SCALES_A_TURN: f64 = 50.0;
 
 /// Position of the sleepers relative to the stated positions.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct SleeperPattern {
-    /// Distance in m by which the sleepers lie further along the track than stated, at most half a spacing.
+    /// Distance in m by which the sleepers lie further along the track than stated, at most half a spacing; in the middle
+    /// of the compared sleepers.
     pub shift_m: f64,
+    /// Distances of the sleepers divided by the stated ones; 1 if no error is distinguishable.
+    pub distance_ratio: f64,
+    /// Distance in m from the middle to the first and the last span.
+    pub half_length_m: f64,
     /// Standard deviation of the distance in m.
     pub deviation_m: f64,
     /// Amplitude of the pattern divided by its standard deviation.
@@ -65,7 +76,8 @@ impl SleeperPattern {
                 *found = measured.along(span, &expected);
             }
         }
-        let spans: Vec<Complex64> = spans.into_iter().flatten().collect();
+        let spans = spans.into_iter().enumerate();
+        let spans: Vec<_> = spans.filter_map(|(span, it)| Some((span as f64, it?))).collect();
         (spans.len() >= SPANS_MIN)
             .then(|| Self::from_spans(&spans, recording.spacing_m))
             .filter(|pattern| pattern.contrast > CONTRAST_MIN)
@@ -73,6 +85,9 @@ impl SleeperPattern {
 
     /// Sentence on sleepers that do not lie where the recording states them.
     pub fn doubt(&self) -> Option<String> {
+        if self.distance_ratio != 1.0 {
+            return Some(self.wrong_scale());
+        }
         let Self { shift_m, deviation_m, spacing_m, .. } = *self;
         let least_m = (OFFSET_MIN * spacing_m).max(DEVIATIONS_MIN * deviation_m);
         (shift_m.abs() > least_m).then(|| {
@@ -91,7 +106,44 @@ impl SleeperPattern {
         })
     }
 
-    fn from_spans(spans: &[Complex64], spacing_m: f64) -> Self {
+    fn wrong_scale(&self) -> String {
+        let Self { shift_m, distance_ratio, half_length_m, .. } = *self;
+        let [first_m, last_m] =
+            [-half_length_m, half_length_m].map(|x_m| shift_m + (distance_ratio - 1.0) * x_m);
+        format!(
+            "By the levels within a span, the distances of the sleepers are {distance_ratio:.4} times the stated ones in \
+             all passes: the sleepers lie {first_m:+.2} m from their stated positions at one end, and {last_m:+.2} m at \
+             the other, and the estimates belong to places between sleepers. Correct the wheel circumference of the \
+             odometer, or the stated positions."
+        )
+    }
+
+    /// The pattern of spans by their number. Its phase turns along the track if the stated distances are wrong.
+    fn from_spans(spans: &[(f64, Complex64)], spacing_m: f64) -> Self {
+        let (first, last) = (spans[0].0, spans[spans.len() - 1].0);
+        let middle = 0.5 * (first + last);
+        let turned = |scale: f64| -> Vec<Complex64> {
+            let turn =
+                |(span, it): &(f64, Complex64)| it * Complex64::cis(TAU * scale * (span - middle));
+            spans.iter().map(turn).collect()
+        };
+        let length = last - first + 1.0;
+        let steps = (SCALE_MAX * length * SCALES_A_TURN).floor() as i32;
+        let scales = (-steps..=steps).map(|step| f64::from(step) / (length * SCALES_A_TURN));
+        let sum = |scale: &f64| turned(*scale).iter().sum::<Complex64>().norm();
+        let scale = scales.max_by(|a, b| sum(a).total_cmp(&sum(b))).unwrap_or(0.0);
+        let of = |scale: f64| Self::in_phase(&turned(scale), spacing_m);
+        let found = of(scale);
+        // A straight line through phases of equal scatter.
+        let deviation = found.deviation_m / spacing_m * 12f64.sqrt() / length;
+        let is_known = scale.abs() > (2.0 * OFFSET_MIN / length).max(DEVIATIONS_MIN * deviation);
+        let kept = if is_known { scale } else { 0.0 };
+        let half_length_m = 0.5 * (length - 1.0) * spacing_m;
+        Self { distance_ratio: 1.0 + kept, half_length_m, ..of(kept) }
+    }
+
+    /// The pattern of spans whose phases differ by chance only.
+    fn in_phase(spans: &[Complex64], spacing_m: f64) -> Self {
         let count = spans.len() as f64;
         let mean = spans.iter().sum::<Complex64>() / count;
         let direction = mean / mean.norm();
@@ -102,6 +154,8 @@ impl SleeperPattern {
         let per_radian_m = spacing_m / TAU;
         Self {
             shift_m: -mean.arg() * per_radian_m,
+            distance_ratio: 1.0,
+            half_length_m: 0.0,
             deviation_m: variance(|it| it.im).sqrt() / mean.norm() * per_radian_m,
             contrast: mean.norm() / variance(|it| it.re).max(variance(|it| it.im)).sqrt(),
             spacing_m,
@@ -237,6 +291,11 @@ mod tests {
 
     /// Two passes of noise whose level repeats with the sleepers of V-Track, `shift_m` after their stated positions.
     fn recording(amplitude: f64, shift_m: f64) -> Recording {
+        scaled(amplitude, shift_m, 1.0)
+    }
+
+    /// As [`recording`], with distances of the sleepers that are `ratio` times the stated ones.
+    fn scaled(amplitude: f64, shift_m: f64, ratio: f64) -> Recording {
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let mut pass = |speed_km_h: f64| {
             let step_m = speed_km_h / 3.6 / RATE_HZ;
@@ -244,7 +303,8 @@ mod tests {
                 (0..(3.6 / step_m) as usize).map(|n| n as f64 * step_m).collect();
             let mut sample = |x_m: &f64| {
                 let uniform = random.next_u64() as f64 / u64::MAX as f64 - 0.5;
-                uniform * (0.5 * amplitude * (TAU * (x_m - shift_m) / SPACING_M).cos()).exp()
+                uniform
+                    * (0.5 * amplitude * (TAU * (x_m - shift_m) / (ratio * SPACING_M)).cos()).exp()
             };
             let samples = position_m.iter().map(&mut sample).collect();
             let signal = Signal::new(RATE_HZ, samples).unwrap();
@@ -282,6 +342,18 @@ mod tests {
             let doubt = found.doubt().unwrap();
             let remedy = if shift_m < 0.0 { "subtract it from" } else { "add it to" };
             assert!(found.deviation_m < 0.004 && doubt.contains(remedy), "{doubt}");
+        }
+    }
+
+    #[test]
+    fn distances_that_are_wrong_by_a_percent_are_found() {
+        let found = pattern(&recording(0.4, 0.0)).unwrap();
+        assert_eq!(found.distance_ratio, 1.0);
+        for ratio in [0.98, 1.01] {
+            let found = pattern(&scaled(0.4, 0.0, ratio)).unwrap();
+            assert!((found.distance_ratio - ratio).abs() < 3e-3, "{found:?}");
+            let doubt = found.doubt().unwrap();
+            assert!(doubt.contains("times the stated ones in all passes"), "{doubt}");
         }
     }
 

@@ -92,12 +92,21 @@ impl Fitted {
         let common =
             Common::ALL.map(|of| (format!("the {}", common(of).label()), unknowns.common(of)));
         let (typical, deviations) = (unknowns.typical(), unknowns.prior_deviations());
+        let level = unknowns.level();
+        let expected = unknowns.mean[Own::Level as usize];
+        let log = values.rows(level.start, level.len()).mean() - expected.log;
+        let level = Unusual {
+            quantity: format!("the {}", Parameter::IrregularityLevel.label()),
+            ratio: log.exp(),
+            deviations: log.abs() / expected.deviation,
+        };
         speeds
             .chain(common)
             .map(|(quantity, at)| {
                 let log = values[at] - typical[at];
                 Unusual { quantity, ratio: log.exp(), deviations: log.abs() / deviations[at] }
             })
+            .chain([level])
             .max_by(|a, b| a.deviations.total_cmp(&b.deviations))
             .filter(|found| found.deviations > UNUSUAL)
     }

@@ -196,7 +196,7 @@ impl Inversion {
         Some(format!(
             "By the fit, {quantity} is {ratio:.2} times the expected value ({deviations:.1} standard deviations of \
              what is usual): the description of sensor, vehicle or track may be wrong, and with it all \
-             estimates. Check gain, unsprung mass, rail and sleepers."
+             estimates. Check unit and gain of the acceleration, unsprung mass, rail and sleepers."
         ))
     }
 

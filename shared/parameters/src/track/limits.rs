@@ -5,6 +5,9 @@ use super::{TRACK_FORMAT, TrackError};
 use crate::quantity::SPEED;
 use crate::{DesignNumber, Parameter, check_wavelengths};
 
+/// Largest distance of a further wheel in m.
+const WHEELS_MAX_M: f64 = 30.0;
+
 impl File {
     pub(super) fn check(&self) -> Result<(), TrackError> {
         if self.format != TRACK_FORMAT {
@@ -35,8 +38,17 @@ impl File {
         let all = || [0.0].iter().chain(wheels);
         let touches = |(number, place): &(usize, &f64)| {
             let mut before = all().take(number + 1);
-            !place.is_finite() || before.any(|other| (*place - other).abs() < 2.0 * radius_m)
+            before.any(|other| (*place - other).abs() < 2.0 * radius_m)
         };
+        let possible = -WHEELS_MAX_M..=WHEELS_MAX_M;
+        if let Some(place) = wheels.iter().find(|place| !possible.contains(place)) {
+            let wanted =
+                format!("{place} m is no distance of an axle; it is at most {WHEELS_MAX_M} m");
+            return Err(TrackError::Inconsistent {
+                key: "vehicle.further_wheels_m",
+                message: wanted,
+            });
+        }
         if let Some((_, place)) = wheels.iter().enumerate().find(touches) {
             return Err(TrackError::Inconsistent {
                 key: "vehicle.further_wheels_m",
