@@ -3,6 +3,7 @@
 use super::columns::{Columns, NAMES};
 use super::error::{Fault, RecordingError};
 use super::manifest::{FILE_NAME, Manifest, PassEntry};
+use super::motion::MotionFault;
 use super::odometer::Odometer;
 use super::selection::Selection;
 use super::sleeper::Sleeper;
@@ -312,9 +313,10 @@ fn read_pass(
     let (entry, sample_rate_hz) = (&manifest.passes[index], manifest.sample_rate_hz);
     let columns = Columns::read(path)?;
     let clock = check::times(manifest_path, path, &columns, sample_rate_hz)?;
-    let of_position = |fault| RecordingError::new(path, "position_m", fault);
-    let odometer =
-        Odometer::straightened(columns.position_m, sample_rate_hz).map_err(of_position)?;
+    let of_position =
+        |fault: MotionFault| RecordingError::new(path, "position_m", Fault::Motion(fault));
+    let odometer = Odometer::straightened(columns.position_m, sample_rate_hz, spacing_m)
+        .map_err(of_position)?;
     if !manifest.sleepers.is_empty() {
         odometer.tells_sleepers(spacing_m).map_err(of_position)?;
     }

@@ -3,25 +3,17 @@
 //! This module checks a position column alone. It interpolates steps and returns an error for an
 //! impossible motion. Other modules check the agreement with times and speeds.
 
-use super::error::Fault;
+use super::motion::MotionFault;
+use super::steps::Steps;
 
 /// Median number of samples with constant position above which it advances in steps.
 const STAIR_SAMPLES: usize = 2;
 /// Number of steps below which an interpolation is impossible.
 const STEPS_MIN: usize = 4;
-/// Share of the usual speed below which a wheel is at rest, and the shortest time of rest in s.
-const STANDING: f64 = 0.1;
-const STANDING_S: f64 = 0.2;
-/// Ratio to the usual speed above which a change of position is a jump.
-pub const JUMP: f64 = 5.0;
-/// Smallest change of position in m that counts as a jump.
-pub const JUMP_M: f64 = 0.01;
 /// Share of a pass's length by which a restarted position falls back.
 const RESTART: f64 = 0.5;
 /// Longest step as a share of the sleeper spacing that separates sleepers.
 const STEPS_A_SPACING: f64 = 4.0;
-/// Steps at either end of a pass whose speed is taken for what lies outside them.
-const END_STEPS: usize = 8;
 
 /// Positions of a pass, and the length of their original steps.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,22 +25,30 @@ pub(super) struct Odometer {
 }
 
 impl Odometer {
-    /// Checks and interpolates positions in m at even times, along the direction of travel.
+    /// Checks and interpolates positions in m at even times, along the direction of travel, over sleepers at
+    /// this spacing.
     ///
     /// Steps become straight lines between the instants at which the position changes. At these instants
     /// the position is known to half a step; between them the speed is assumed constant.
     ///
     /// # Errors
-    /// [`Fault::StandsStill`], [`Fault::Decreases`], [`Fault::RunsBack`], [`Fault::Restarts`],
-    /// [`Fault::Jumps`] or [`Fault::FewSteps`].
-    pub(super) fn straightened(position_m: Vec<f64>, rate_hz: f64) -> Result<Self, Fault> {
+    /// [`MotionFault::StandsStill`], [`MotionFault::Decreases`], [`MotionFault::RunsBack`], [`MotionFault::Restarts`],
+    /// [`MotionFault::Jumps`] or [`MotionFault::FewSteps`].
+    pub(super) fn straightened(
+        position_m: Vec<f64>,
+        rate_hz: f64,
+        spacing_m: f64,
+    ) -> Result<Self, MotionFault> {
         forwards(&position_m)?;
         let steps = Steps::of(&position_m);
         let is_stair = steps.median_run() >= STAIR_SAMPLES;
         if is_stair && steps.changes.len() < STEPS_MIN {
-            return Err(Fault::FewSteps { steps: steps.changes.len(), step_m: steps.median_m() });
+            return Err(MotionFault::FewSteps {
+                steps: steps.changes.len(),
+                step_m: steps.median_m(),
+            });
         }
-        steps.check(rate_hz)?;
+        steps.check(rate_hz, spacing_m)?;
         if !is_stair {
             return Ok(Self { position_m, step_m: None });
         }
@@ -58,11 +58,11 @@ impl Odometer {
     /// Whether steps of this length separate sleepers at this spacing.
     ///
     /// # Errors
-    /// [`Fault::CoarsePosition`] if the steps are too long.
-    pub(super) fn tells_sleepers(&self, spacing_m: f64) -> Result<(), Fault> {
+    /// [`MotionFault::CoarsePosition`] if the steps are too long.
+    pub(super) fn tells_sleepers(&self, spacing_m: f64) -> Result<(), MotionFault> {
         match self.step_m {
             Some(step_m) if step_m > spacing_m / STEPS_A_SPACING => {
-                Err(Fault::CoarsePosition { step_m, needed_m: spacing_m / STEPS_A_SPACING })
+                Err(MotionFault::CoarsePosition { step_m, needed_m: spacing_m / STEPS_A_SPACING })
             }
             _ => Ok(()),
         }
@@ -70,10 +70,10 @@ impl Odometer {
 }
 
 /// Checks that the position never decreases.
-fn forwards(position_m: &[f64]) -> Result<(), Fault> {
+fn forwards(position_m: &[f64]) -> Result<(), MotionFault> {
     let (first, last) = (position_m[0], position_m[position_m.len() - 1]);
     if position_m.iter().all(|&place| place == first) {
-        return Err(Fault::StandsStill { from_s: 0.0, to_s: None });
+        return Err(MotionFault::StandsStill { row: 1, from_s: 0.0, to_s: None });
     }
     let Some(index) = position_m.windows(2).position(|pair| pair[1] < pair[0]) else {
         return Ok(());
@@ -84,137 +84,12 @@ fn forwards(position_m: &[f64]) -> Result<(), Fault> {
     let back = position_m.windows(2).filter(|pair| pair[1] < pair[0]).count();
     let ahead = position_m.windows(2).filter(|pair| pair[1] > pair[0]).count();
     Err(if back > ahead && last < first {
-        Fault::Decreases { from_m: first, to_m: last }
+        MotionFault::Decreases { from_m: first, to_m: last }
     } else if before - after > RESTART * (high - low) {
-        Fault::Restarts { row, before, after }
+        MotionFault::Restarts { row, before, after }
     } else {
-        Fault::RunsBack { row, before, after }
+        MotionFault::RunsBack { row, before, after }
     })
-}
-
-/// A column of positions as the instants at which it changes.
-struct Steps<'a> {
-    position_m: &'a [f64],
-    /// Indices of the samples that differ from the one before.
-    changes: Vec<usize>,
-}
-
-impl<'a> Steps<'a> {
-    fn of(position_m: &'a [f64]) -> Self {
-        let changed = |&index: &usize| position_m[index] != position_m[index - 1];
-        Self { position_m, changes: (1..position_m.len()).filter(changed).collect() }
-    }
-
-    /// Median number of samples from one change to the next.
-    fn median_run(&self) -> usize {
-        let runs = self.changes.windows(2).map(|pair| pair[1] - pair[0]);
-        median(runs.collect::<Vec<_>>(), usize::cmp).unwrap_or(self.position_m.len())
-    }
-
-    /// Median length of the changes in m.
-    fn median_m(&self) -> f64 {
-        let lengths = self.changes.iter().map(|&index| self.step(index));
-        median(lengths.collect::<Vec<_>>(), f64::total_cmp).unwrap_or(0.0)
-    }
-
-    fn step(&self, index: usize) -> f64 {
-        self.position_m[index] - self.position_m[index - 1]
-    }
-
-    /// Checks that the position neither stops nor jumps.
-    fn check(&self, rate_hz: f64) -> Result<(), Fault> {
-        let last = self.position_m.len() - 1;
-        let (usual, step_m) = (self.usual_speed() * rate_hz, self.median_m());
-        let bounds = std::iter::once(0).chain(self.changes.iter().copied()).chain([last]);
-        let bounds: Vec<usize> = bounds.collect();
-        for pair in bounds.windows(2) {
-            let [from, to] = [pair[0], pair[1]];
-            let seconds = (to - from) as f64 / rate_hz;
-            let length_m = self.position_m[to] - self.position_m[from];
-            // After the last change and before the first one a step may be under way.
-            let length_m = length_m.max(if to == last || from == 0 { step_m } else { 0.0 });
-            if seconds > STANDING_S && length_m < STANDING * usual * seconds {
-                let [from_s, to_s] = [from, to].map(|index| index as f64 / rate_hz);
-                return Err(Fault::StandsStill { from_s, to_s: Some(to_s) });
-            }
-            let excess = length_m - JUMP * usual * seconds;
-            if excess > JUMP_M.max((JUMP - 1.0) * step_m) {
-                let (before, after) = (self.position_m[to - 1], self.position_m[to]);
-                return Err(Fault::Jumps { row: to + 1, before, after });
-            }
-        }
-        Ok(())
-    }
-
-    /// Median speed between changes in m a sample, each weighted by its length.
-    fn usual_speed(&self) -> f64 {
-        let speed = |pair: &[usize]| (self.step(pair[1]) / (pair[1] - pair[0]) as f64, pair[1]);
-        let mut speeds: Vec<(f64, usize)> = self.changes.windows(2).map(speed).collect();
-        speeds.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let whole: f64 = speeds.iter().map(|&(_, index)| self.step(index)).sum();
-        let mut below = 0.0;
-        let half = speeds.iter().find(|&&(_, index)| {
-            below += self.step(index);
-            below >= 0.5 * whole
-        });
-        half.map_or(0.0, |&(speed, _)| speed)
-    }
-
-    /// Whether values are held at even instants, as a receiver does, not at even places.
-    fn is_held(&self) -> bool {
-        let spread = |values: Vec<f64>| {
-            let mean = values.iter().sum::<f64>() / values.len() as f64;
-            let square = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
-            (square / values.len() as f64).sqrt() / mean
-        };
-        let runs = self.changes.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect();
-        let lengths = self.changes.iter().map(|&index| self.step(index)).collect();
-        spread(runs) < spread(lengths)
-    }
-
-    /// Straight lines through the changes, and on at the speed of the steps next to an end.
-    fn straight(&self) -> Vec<f64> {
-        let knots = self.knots();
-        let [first, last] = [knots[0], knots[knots.len() - 1]];
-        let near = END_STEPS.min(knots.len() - 1);
-        let slope = |a: (f64, f64), b: (f64, f64)| (b.1 - a.1) / (b.0 - a.0);
-        // No further than a step: then the next one would have been seen.
-        let bound = |slope: f64, samples: f64| slope.min(self.median_m() / samples.max(1.0));
-        let count = self.position_m.len();
-        let before = bound(slope(first, knots[near]), first.0);
-        let after = bound(slope(knots[knots.len() - 1 - near], last), count as f64 - last.0);
-        let mut segment = 0;
-        let place = |index: usize| {
-            let at = index as f64;
-            if at <= first.0 {
-                return first.1 + before * (at - first.0);
-            }
-            if at >= last.0 {
-                return last.1 + after * (at - last.0);
-            }
-            while knots[segment + 1].0 < at {
-                segment += 1;
-            }
-            let (a, b) = (knots[segment], knots[segment + 1]);
-            a.1 + slope(a, b) * (at - a.0)
-        };
-        (0..count).map(place).collect()
-    }
-
-    /// Instants in samples at which the position is known, and the position there in m.
-    ///
-    /// A rounded position changes half way between its values; one that is held is new when it changes.
-    fn knots(&self) -> Vec<(f64, f64)> {
-        let back = if self.is_held() { 0.0 } else { 0.5 };
-        let knot =
-            |&index: &usize| (index as f64 - 0.5, self.position_m[index] - back * self.step(index));
-        self.changes.iter().map(knot).collect()
-    }
-}
-
-fn median<T: Copy>(mut values: Vec<T>, order: impl Fn(&T, &T) -> std::cmp::Ordering) -> Option<T> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, order).1)
 }
 
 #[cfg(test)]
@@ -223,6 +98,7 @@ mod tests {
 
     const RATE_HZ: f64 = 2000.0;
     const SPEED_M_S: f64 = 67.4 / 3.6;
+    const SPACING_M: f64 = 0.6;
 
     /// Ten seconds from a place that is no multiple of anything, braking by a tenth.
     fn true_m() -> Vec<f64> {
@@ -255,7 +131,7 @@ mod tests {
     #[test]
     fn steps_become_lines_that_are_true_to_half_a_step() {
         for step_m in [0.05, 0.1, 1.0, 7.0] {
-            let odometer = Odometer::straightened(stepped(step_m), RATE_HZ).unwrap();
+            let odometer = Odometer::straightened(stepped(step_m), RATE_HZ, SPACING_M).unwrap();
             assert!((odometer.step_m.unwrap() / step_m - 1.0).abs() < 1e-6);
             assert!(odometer.position_m.is_sorted());
             let [each, span] = off(&odometer.position_m);
@@ -266,7 +142,7 @@ mod tests {
     #[test]
     fn values_held_for_a_while_become_lines_and_the_speed_is_right() {
         for samples in [20, 200, 2000] {
-            let odometer = Odometer::straightened(held(samples), RATE_HZ).unwrap();
+            let odometer = Odometer::straightened(held(samples), RATE_HZ, SPACING_M).unwrap();
             let step_m = odometer.step_m.unwrap();
             let [each, span] = off(&odometer.position_m);
             assert!(each < 0.1 * step_m && span < 0.1 * step_m, "{samples}: {each} {span}");
@@ -276,18 +152,18 @@ mod tests {
     #[test]
     fn fine_positions_stay_as_they_are() {
         for places in [true_m(), stepped(1e-3), stepped(6e-3)] {
-            let odometer = Odometer::straightened(places.clone(), RATE_HZ).unwrap();
+            let odometer = Odometer::straightened(places.clone(), RATE_HZ, SPACING_M).unwrap();
             assert_eq!(odometer, Odometer { position_m: places, step_m: None });
         }
     }
 
     #[test]
     fn steps_too_long_for_the_sleepers_are_refused_for_them_only() {
-        let odometer = Odometer::straightened(stepped(1.0), RATE_HZ).unwrap();
-        assert!(matches!(odometer.tells_sleepers(0.6), Err(Fault::CoarsePosition { .. })));
-        let odometer = Odometer::straightened(stepped(0.05), RATE_HZ).unwrap();
+        let odometer = Odometer::straightened(stepped(1.0), RATE_HZ, SPACING_M).unwrap();
+        assert!(matches!(odometer.tells_sleepers(0.6), Err(MotionFault::CoarsePosition { .. })));
+        let odometer = Odometer::straightened(stepped(0.05), RATE_HZ, SPACING_M).unwrap();
         assert!(odometer.tells_sleepers(0.6).is_ok());
-        let odometer = Odometer::straightened(true_m(), RATE_HZ).unwrap();
+        let odometer = Odometer::straightened(true_m(), RATE_HZ, SPACING_M).unwrap();
         assert!(odometer.tells_sleepers(0.125).is_ok());
     }
 
@@ -298,28 +174,73 @@ mod tests {
                 let rounded = |x: f64| if step_m > 0.0 { (x / step_m).round() * step_m } else { x };
                 let places = true_m();
                 let changed = places.iter().enumerate().map(|(row, &x)| rounded(change(row, x)));
-                Odometer::straightened(changed.collect(), RATE_HZ).unwrap_err()
+                Odometer::straightened(changed.collect(), RATE_HZ, SPACING_M).unwrap_err()
             })
         };
-        let all = |faults: [Fault; 3], of_kind: fn(&Fault) -> bool| {
+        let all = |faults: [MotionFault; 3], of_kind: fn(&MotionFault) -> bool| {
             assert!(faults.iter().all(of_kind), "{faults:?}");
         };
-        all(fault(&|_, x| -x), |f| matches!(f, Fault::Decreases { .. }));
-        all(fault(&|_, _| 3.0), |f| matches!(f, Fault::StandsStill { .. }));
+        all(fault(&|_, x| -x), |f| matches!(f, MotionFault::Decreases { .. }));
+        all(fault(&|_, _| 3.0), |f| matches!(f, MotionFault::StandsStill { .. }));
         let places = true_m();
         let rest = |row: usize, x: f64| {
             let (from, to) = (places[8000], places[14_000]);
             if row < 14_000 { x.min(from) } else { x - (to - from) }
         };
-        all(fault(&rest), |f| matches!(f, Fault::StandsStill { to_s: Some(_), .. }));
+        all(fault(&rest), |f| matches!(f, MotionFault::StandsStill { to_s: Some(_), .. }));
         all(fault(&|row, x| if row < 8000 { x } else { x + 30.0 }), |f| {
-            matches!(f, Fault::Jumps { row: 7990..8110, .. })
+            matches!(f, MotionFault::Jumps { row: 7990..8110, .. })
         });
         all(fault(&|row, x| if row < 8000 { x } else { x - 150.0 }), |f| {
-            matches!(f, Fault::Restarts { row: 7990..8110, .. } | Fault::RunsBack { .. })
+            matches!(
+                f,
+                MotionFault::Restarts { row: 7990..8110, .. } | MotionFault::RunsBack { .. }
+            )
         });
         let mut few = held(8000);
         few.truncate(18_000);
-        assert!(matches!(Odometer::straightened(few, RATE_HZ), Err(Fault::FewSteps { .. })));
+        assert!(matches!(
+            Odometer::straightened(few, RATE_HZ, SPACING_M),
+            Err(MotionFault::FewSteps { .. })
+        ));
+    }
+
+    /// Positions that are constant from one time in s on for so many seconds, then true or late by that.
+    fn with_hold(fine: &[f64], from_s: f64, seconds: f64, is_late: bool) -> Vec<f64> {
+        let [from, until] = [from_s, from_s + seconds].map(|time| (time * RATE_HZ) as usize);
+        let late_m = if is_late { fine[until] - fine[from] } else { 0.0 };
+        let place = |(row, &x): (usize, &f64)| match row {
+            _ if row < from => x,
+            _ if row < until => fine[from],
+            _ => x - late_m,
+        };
+        fine.iter().enumerate().map(place).collect()
+    }
+
+    #[test]
+    fn a_position_that_is_held_and_catches_up_is_refused_with_its_rows() {
+        for (seconds, end) in [(0.05, 8101), (0.3, 8601), (3.0, 14_001)] {
+            for places in [true_m(), stepped(6e-3), stepped(0.05)] {
+                let held = with_hold(&places, 4.0, seconds, false);
+                let fault = Odometer::straightened(held, RATE_HZ, SPACING_M).unwrap_err();
+                let MotionFault::Jumps { row, constant_from: Some(from), .. } = fault else {
+                    panic!("{seconds} s: {fault:?}");
+                };
+                assert!(row.abs_diff(end) <= 6 && from.abs_diff(8001) <= 6, "{from} to {row}");
+                let text = fault.to_string();
+                assert!(text.contains(&format!("row {from} to row {}; leave", row - 1)), "{text}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_position_that_is_held_and_goes_on_late_is_refused_and_a_stop_is_not() {
+        let late = with_hold(&true_m(), 4.0, 0.05, true);
+        let fault = Odometer::straightened(late, RATE_HZ, SPACING_M).unwrap_err();
+        assert!(matches!(fault, MotionFault::StandsStill { row: 8001, .. }), "{fault:?}");
+        // The last metres before a stop, with a resolution of a millimetre.
+        let braking = (0..8000).map(|row| (f64::from(row) - 8000.0) / RATE_HZ);
+        let braking = braking.map(|time| ((100.0 - time * time) * 1e3).round() / 1e3);
+        Odometer::straightened(braking.collect(), RATE_HZ, SPACING_M).unwrap();
     }
 }

@@ -1,6 +1,7 @@
 //! Conversion of tables to a recording.
 
 use super::super::error::{Fault, RecordingError};
+use super::super::motion::MotionFault;
 use super::super::{Pass, Recording, Sleeper, check, quiet};
 use super::raw::Raw;
 use super::{AccelerationUnit, Layout, Table};
@@ -114,7 +115,10 @@ fn alike(raw: &[Raw]) -> Result<(), RecordingError> {
 fn is_backwards(raw: &[Raw]) -> Result<bool, RecordingError> {
     let first = raw.first().is_some_and(Raw::is_backwards);
     match raw.iter().find(|other| other.is_backwards() != first) {
-        Some(other) => Err(RecordingError::new(&other.path, other.places.name, Fault::Directions)),
+        Some(other) => {
+            let fault = MotionFault::Directions.into();
+            Err(RecordingError::new(&other.path, other.places.name, fault))
+        }
         None => Ok(first),
     }
 }

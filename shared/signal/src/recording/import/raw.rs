@@ -72,9 +72,11 @@ impl Raw {
             self.places.position_m.iter_mut().for_each(|place| *place = -*place);
         }
         let position_m = std::mem::take(&mut self.places.position_m);
-        let odometer = Odometer::straightened(position_m, self.rate_hz).map_err(fault)?;
+        let odometer = Odometer::straightened(position_m, self.rate_hz, layout.spacing_m())
+            .map_err(|found| fault(found.into()))?;
         if layout.sleeper_m.is_some() {
-            odometer.tells_sleepers(layout.spacing_m()).map_err(fault)?;
+            let told = odometer.tells_sleepers(layout.spacing_m());
+            told.map_err(|found| fault(found.into()))?;
         }
         let Odometer { position_m, step_m } = odometer;
         notes.extend(step_m.map(|step_m| straightened(&file, step_m)));
