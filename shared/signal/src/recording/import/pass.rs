@@ -4,7 +4,7 @@ use super::super::error::{Fault, RecordingError};
 use super::super::motion::MotionFault;
 use super::super::{Pass, Recording, Sleeper, check, quiet};
 use super::raw::Raw;
-use super::{AccelerationUnit, Layout, Table};
+use super::{AccelerationUnit, Layout, Table, speeds};
 use serde_json::{Map, json};
 use std::path::{Path, PathBuf};
 use tracktwin_parameters::QuantityError;
@@ -66,10 +66,11 @@ fn recording(tables: &[Table], column: &str, layout: &Layout) -> Result<Imported
     let is_gain_known = raw.iter().all(|raw| raw.unit != AccelerationUnit::Unknown);
     let rate = raw.first().map_or(0.0, |raw| raw.rate_hz);
     let first = raw.first().map_or_else(|| PathBuf::from("files"), |raw| raw.path.clone());
-    let passes: Vec<Pass> = raw
+    let mut passes: Vec<Pass> = raw
         .into_iter()
         .map(|raw| raw.into_pass(column, is_backwards, layout, &mut notes))
         .collect::<Result<_, _>>()?;
+    speeds::assign(&mut passes, layout.speed_km_h, &mut notes);
     let known = layout.sleeper_m.map(|x_m| if is_backwards { -x_m } else { x_m });
     let sleepers = known
         .map_or_else(|| Ok(Vec::new()), |x_m| sleepers(&passes, layout.spacing_m(), x_m))
