@@ -40,7 +40,8 @@ pub struct Recording {
     pub nominal: Map<String, Value>,
     /// Sleeper spacing in m: the length of the window of a sleeper.
     pub spacing_m: f64,
-    /// Corrections made while reading, and doubts about the data: one sentence each.
+    /// Corrections made by the import or while reading, and doubts about the data: one sentence each. They are `notes`
+    /// of `recording.json`.
     pub doubts: Vec<String>,
 }
 
@@ -112,12 +113,14 @@ impl Recording {
         let stated = Self::of_manifest(folder, manifest, spacing_m);
         let name = stated.name.clone() + &selection.suffix();
         doubts.extend(doubts_on_names(&stated.nominal));
-        let mut recording = Self { name, passes, doubts, ..stated };
+        let mut recording = Self { name, passes, ..stated };
         recording.check_sleepers(&manifest_path)?;
         let gain_known = recording.gain_known();
         let quiet = recording.passes.iter().filter_map(|pass| quiet::doubt(pass, gain_known));
-        let quiet: Vec<String> = quiet.collect();
-        recording.doubts.extend(quiet);
+        doubts.extend(quiet);
+        // A recording that was read and written again states them already.
+        doubts.retain(|doubt| !recording.doubts.contains(doubt));
+        recording.doubts.extend(doubts);
         Ok(recording)
     }
 
@@ -142,7 +145,7 @@ impl Recording {
             sleepers: manifest.sleepers,
             nominal: manifest.nominal,
             spacing_m,
-            doubts: Vec::new(),
+            doubts: manifest.notes,
         }
     }
 
@@ -261,6 +264,7 @@ impl Recording {
                 .collect(),
             sleepers: self.sleepers.clone(),
             nominal: self.nominal.clone(),
+            notes: self.doubts.clone(),
         }
     }
 }

@@ -18,6 +18,8 @@ pub(super) struct Manifest {
     pub passes: Vec<PassEntry>,
     pub sleepers: Vec<Sleeper>,
     pub nominal: Map<String, Value>,
+    /// Corrections and doubts of the import.
+    pub notes: Vec<String>,
 }
 
 /// One pass of `recording.json`.
@@ -74,6 +76,7 @@ impl Manifest {
             passes: passes.iter().map(PassEntry::parse).collect::<Result<_, _>>()?,
             sleepers: sleepers_along_the_track(root, &sleepers)?,
             nominal: root.get("nominal").and_then(Value::as_object).cloned().unwrap_or_default(),
+            notes: root.texts("notes", "a list of texts")?,
         })
     }
 
@@ -85,7 +88,7 @@ impl Manifest {
             .iter()
             .map(|sleeper| json!({"id": sleeper.id, "x_m": sleeper.x_m}))
             .collect();
-        let root = json!({
+        let mut root = json!({
             "format": FORMAT,
             "sample_rate_Hz": self.sample_rate_hz,
             "channel": self.channel,
@@ -93,6 +96,9 @@ impl Manifest {
             "sleepers": sleepers,
             "nominal": self.nominal,
         });
+        if !self.notes.is_empty() {
+            root["notes"] = json!(self.notes);
+        }
         format!("{root:#}\n")
     }
 }
@@ -190,6 +196,16 @@ impl<'a> Fields<'a> {
             return Ok(number);
         }
         Err(self.fault(name, Fault::WrongValue { found: number.to_string(), expected }))
+    }
+
+    /// A list of texts. Empty if the field is missing.
+    fn texts(&self, name: &str, expected: &'static str) -> Result<Vec<String>, RecordingError> {
+        let Some(value) = self.get(name).filter(|value| !value.is_null()) else {
+            return Ok(Vec::new());
+        };
+        let text = |entry: &Value| entry.as_str().map(str::to_owned);
+        let texts = value.as_array().and_then(|entries| entries.iter().map(text).collect());
+        texts.ok_or_else(|| self.wrong(name, value, expected))
     }
 
     fn list(&self, name: &str, expected: &'static str) -> Result<Vec<Fields<'a>>, RecordingError> {

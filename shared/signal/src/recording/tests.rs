@@ -193,6 +193,8 @@ fn every_field_that_is_needed_is_asked_for_by_name() {
     );
     let text = message(|root| root["format"] = json!("aba-recording/2"));
     assert!(text.contains("\"aba-recording/1\""), "{text}");
+    let text = message(|root| root["notes"] = json!(["one", 2]));
+    assert_eq!(text, "recording.json: notes: is [\"one\",2]; give a list of texts");
     let text = message(|root| root["passes"] = json!([]));
     assert!(text.starts_with("recording.json: passes: is []; give"), "{text}");
 }

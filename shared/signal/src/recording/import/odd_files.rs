@@ -226,7 +226,8 @@ fn copies_do_not_count_as_repeats() {
     }
     // In a folder it is left out and not refused: simulated passes without noise repeat to the bit.
     let [once, twice] = ["once", "twice"].map(|name| folder.path().join(name));
-    let mut recording = one(&copy, &layout()).unwrap().recording;
+    let told = Layout { spacing_m: Some(0.6), ..layout() };
+    let mut recording = one(&copy, &told).unwrap().recording;
     recording.write(&once).unwrap();
     recording.passes.extend([recording.passes[0].clone(), recording.passes[0].clone()]);
     recording.write(&twice).unwrap();

@@ -50,6 +50,7 @@ fn names(table: &Table) -> String {
 
 fn recording(tables: &[Table], column: &str, layout: &Layout) -> Result<Imported, RecordingError> {
     let mut notes: Vec<String> = Vec::new();
+    let mut corrections: Vec<String> = Vec::new();
     let raw: Vec<Raw> = tables
         .iter()
         .map(|table| Raw::of(table, column, layout, &mut notes))
@@ -57,7 +58,7 @@ fn recording(tables: &[Table], column: &str, layout: &Layout) -> Result<Imported
     alike(&raw)?;
     let is_backwards = is_backwards(&raw)?;
     if is_backwards {
-        notes.push(
+        corrections.push(
             "the positions decrease along the pass: the recording stores them, and the \
              positions of the sleepers, with the opposite sign"
                 .to_owned(),
@@ -68,34 +69,41 @@ fn recording(tables: &[Table], column: &str, layout: &Layout) -> Result<Imported
     let first = raw.first().map_or_else(|| PathBuf::from("files"), |raw| raw.path.clone());
     let mut passes: Vec<Pass> = raw
         .into_iter()
-        .map(|raw| raw.into_pass(column, is_backwards, layout, &mut notes))
+        .map(|raw| raw.into_pass(column, is_backwards, layout, (&mut notes, &mut corrections)))
         .collect::<Result<_, _>>()?;
-    speeds::assign(&mut passes, layout.speed_km_h, &mut notes);
+    speeds::assign(&mut passes, layout.speed_km_h, &mut corrections);
     let known = layout.sleeper_m.map(|x_m| if is_backwards { -x_m } else { x_m });
     let sleepers = known
         .map_or_else(|| Ok(Vec::new()), |x_m| sleepers(&passes, layout.spacing_m(), x_m))
         .map_err(|error| RecordingError::new(&first, "spacing_m", Fault::OutOfRange(error)))?;
-    notes.extend(layout.assumed());
+    corrections.extend(layout.assumed());
     if sleepers.is_empty() {
         notes.push("no sleeper position is known: the recording has no sleepers".to_owned());
     }
+    notes.extend(corrections.iter().cloned());
+    let is_doubt = |note: &String| note.starts_with("doubt: ");
+    let doubts = corrections.into_iter().chain(notes.iter().filter(|note| is_doubt(note)).cloned());
+    let doubts: Vec<String> = doubts.collect();
+    // Found again when the recording is read.
     notes.extend(passes.iter().filter_map(|pass| quiet::doubt(pass, is_gain_known)));
     // Doubts last, where they are seen.
-    notes.sort_by_key(|note| note.starts_with("doubt: "));
-    let sign = if layout.upwards { ", sign changed from upwards" } else { "" };
+    notes.sort_by_key(is_doubt);
     let recording = Recording {
         name: column.to_owned(),
         sample_rate_hz: rate,
-        channel: format!(
-            "vertical axle-box acceleration, positive downwards (column {column}{sign})"
-        ),
+        channel: channel(column, layout),
         passes,
         sleepers,
         nominal: nominal(layout, is_gain_known),
         spacing_m: layout.spacing_m(),
-        doubts: Vec::new(),
+        doubts,
     };
     Ok(Imported { column: column.to_owned(), recording, notes })
+}
+
+fn channel(column: &str, layout: &Layout) -> String {
+    let sign = if layout.upwards { ", sign changed from upwards" } else { "" };
+    format!("vertical axle-box acceleration, positive downwards (column {column}{sign})")
 }
 
 /// All files have one sample rate, and no file is a copy of another.

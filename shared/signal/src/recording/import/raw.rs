@@ -58,13 +58,14 @@ impl Raw {
         places[places.len() - 1] < places[0]
     }
 
-    /// The pass, without the constant, along the direction of travel.
+    /// The pass, without the constant, along the direction of travel. What was done goes into `notes`, what
+    /// results depend on into `corrections`.
     pub(super) fn into_pass(
         mut self,
         column: &str,
         is_backwards: bool,
         layout: &Layout,
-        notes: &mut Vec<String>,
+        (notes, corrections): (&mut Vec<String>, &mut Vec<String>),
     ) -> Result<Pass, RecordingError> {
         let file = self.file();
         let fault = |fault| RecordingError::new(&self.path, self.places.name, fault);
@@ -79,7 +80,7 @@ impl Raw {
             told.map_err(|found| fault(found.into()))?;
         }
         let Odometer { position_m, step_m } = odometer;
-        notes.extend(step_m.map(|step_m| straightened(&file, step_m)));
+        corrections.extend(step_m.map(|step_m| straightened(&file, step_m)));
         let last = position_m.len() - 1;
         let speed_km_h = 3.6 * (position_m[last] - position_m[0]) * self.rate_hz / last as f64;
         self.places.check_speed(speed_km_h, layout).map_err(fault)?;

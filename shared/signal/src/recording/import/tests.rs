@@ -179,6 +179,23 @@ fn an_imported_recording_opens_again() {
 }
 
 #[test]
+fn doubts_and_corrections_are_kept_in_the_recording_and_read_back() {
+    let folder = folder();
+    let path = csv(folder.path(), "t,acc [g]\n", ",", false);
+    let told = Some(AccelerationUnit::MetrePerSecondSquared);
+    let doubted = Layout { acceleration_unit: told, ..layout() };
+    let [once, twice] = ["once", "twice"].map(|name| folder.path().join(name));
+    import(std::slice::from_ref(&path), &doubted).unwrap()[0].recording.write(&once).unwrap();
+    let recording = Recording::open(&once).unwrap();
+    let [spacing, unit] = &recording.doubts[..] else { panic!("{:?}", recording.doubts) };
+    assert_eq!(spacing, "a sleeper spacing of 0.6 m is assumed; state it with --spacing");
+    assert!(unit.starts_with("doubt: pass.csv: acc [g] is read in m/s2"), "{unit}");
+    // Read and written again, nothing is said twice.
+    recording.write(&twice).unwrap();
+    assert_eq!(Recording::open(&twice).unwrap().doubts, recording.doubts);
+}
+
+#[test]
 fn units_signs_and_places_come_out_in_si() {
     let folder = folder();
     let path = csv(folder.path(), "t,acc\n", ",", false);
