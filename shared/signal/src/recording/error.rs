@@ -331,6 +331,23 @@ pub enum Fault {
         /// The spacing of the sleepers in m.
         spacing_m: f64,
     },
+    /// The sleeper that an import states is far from all passes.
+    #[error(
+        "is {} m, but the passes cover {} to {} m; give the position in m of a sleeper inside \
+             them{}",
+        rounded(*stated_m, 9), rounded(*from_m, 9), rounded(*to_m, 9),
+        guess.map_or_else(String::new, |(x_m, when)| format!(": {} m {when}", rounded(x_m, 9)))
+    )]
+    SleeperOutside {
+        /// The stated position in m.
+        stated_m: f64,
+        /// Where the passes begin, in m.
+        from_m: f64,
+        /// Where they end, in m.
+        to_m: f64,
+        /// A position inside the passes, and when it would be the stated one.
+        guess: Option<(f64, &'static str)>,
+    },
     /// No sleeper has its window inside any pass.
     #[error(
         "no sleeper lies inside a pass (the passes cover {} to {} m); give their positions \

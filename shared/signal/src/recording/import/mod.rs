@@ -19,6 +19,7 @@ mod pass;
 mod places;
 mod rate;
 mod raw;
+mod sleepers;
 mod speeds;
 mod table;
 #[cfg(test)]

@@ -202,6 +202,25 @@ fn a_pass_towards_smaller_positions_is_turned_and_both_ways_are_refused() {
 }
 
 #[test]
+fn a_stated_sleeper_far_from_the_passes_is_refused_with_their_range() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = changed(folder.path(), |_, values| values);
+    let stated = |sleeper_m| Layout { sleeper_m: Some(sleeper_m), ..layout() };
+    let text = complaint(&path, &stated(1.0501));
+    let range = "the passes cover 1000 to 1187.2128";
+    assert!(text.starts_with(&format!("run.csv: sleeper_m: is 1.0501 m, but {range}")), "{text}");
+    assert!(text.ends_with("inside them: 1050.1 m if it was in km"), "{text}");
+    let text = complaint(&path, &stated(1_050_100.0));
+    assert!(text.ends_with(": 1050.1 m if it was in mm, or in m with positions in km"), "{text}");
+    assert!(complaint(&path, &stated(900.0)).ends_with("a sleeper inside them"));
+    one(&path, &stated(995.0)).unwrap();
+    // With the sign of the file.
+    let path = changed(folder.path(), |_, [t, x, acc]| [t, 2000.0 - x, acc]);
+    let text = complaint(&path, &stated(-900.0));
+    assert!(text.contains("is -900 m, but the passes cover 812.787") && text.contains("to 1000 m"));
+}
+
+#[test]
 fn coarse_clocks_are_straightened_and_gaps_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = changed(folder.path(), |_, [t, x, acc]| [(t * 100.0).floor() / 100.0, x, acc]);

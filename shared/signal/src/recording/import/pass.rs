@@ -2,13 +2,11 @@
 
 use super::super::error::{Fault, RecordingError};
 use super::super::motion::MotionFault;
-use super::super::{Pass, Recording, Sleeper, check, quiet};
+use super::super::{Pass, Recording, check, quiet};
 use super::raw::Raw;
-use super::{AccelerationUnit, Layout, Table, speeds};
+use super::{AccelerationUnit, Layout, Table, sleepers, speeds};
 use serde_json::{Map, json};
 use std::path::{Path, PathBuf};
-use tracktwin_parameters::QuantityError;
-use tracktwin_parameters::quantity::SLEEPERS;
 
 /// A recording from imported files, with the changes and assumptions of the import.
 #[derive(Clone, Debug)]
@@ -72,10 +70,10 @@ fn recording(tables: &[Table], column: &str, layout: &Layout) -> Result<Imported
         .map(|raw| raw.into_pass(column, is_backwards, layout, (&mut notes, &mut corrections)))
         .collect::<Result<_, _>>()?;
     speeds::assign(&mut passes, layout.speed_km_h, &mut corrections);
-    let known = layout.sleeper_m.map(|x_m| if is_backwards { -x_m } else { x_m });
-    let sleepers = known
-        .map_or_else(|| Ok(Vec::new()), |x_m| sleepers(&passes, layout.spacing_m(), x_m))
-        .map_err(|error| RecordingError::new(&first, "spacing_m", Fault::OutOfRange(error)))?;
+    let sleepers = sleepers::along(&passes, layout, is_backwards).map_err(|fault| {
+        let entry = if matches!(fault, Fault::OutOfRange(_)) { "spacing_m" } else { "sleeper_m" };
+        RecordingError::new(&first, entry, fault)
+    })?;
     corrections.extend(layout.assumed());
     if sleepers.is_empty() {
         notes.push("no sleeper position is known: the recording has no sleepers".to_owned());
@@ -140,20 +138,4 @@ fn nominal(layout: &Layout, is_gain_known: bool) -> Map<String, serde_json::Valu
     }
     nominal.insert("gain_known".to_owned(), json!(is_gain_known));
     nominal
-}
-
-/// Sleepers at even distances from the one at `known`, over all passes.
-fn sleepers(passes: &[Pass], spacing_m: f64, known: f64) -> Result<Vec<Sleeper>, QuantityError> {
-    let firsts = passes.iter().map(|pass| pass.position_m[0]);
-    let lasts = passes.iter().map(|pass| pass.position_m[pass.position_m.len() - 1]);
-    let number = |x: f64| (x - known) / spacing_m;
-    let from = number(firsts.fold(f64::INFINITY, f64::min)).ceil() as i64;
-    let to = number(lasts.fold(f64::NEG_INFINITY, f64::max)).floor() as i64;
-    // No more than may be.
-    SLEEPERS.check((to - from + 1).max(0) as f64)?;
-    let sleeper = |(index, number): (usize, i64)| Sleeper {
-        id: format!("SN{}", index + 1),
-        x_m: known + number as f64 * spacing_m,
-    };
-    Ok((from..=to).enumerate().map(sleeper).collect())
 }
