@@ -5,10 +5,11 @@ use tracktwin_number::{rounded, significant};
 /// Why positions are no motion of a wheel, with the remedy.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MotionFault {
-    /// The position decreases.
+    /// The position runs against the direction of travel.
     #[error(
-        "decreases from {} m to {} m at row {row}; smooth the positions, or omit them and \
-             give the speed",
+        "{} from {} m to {} m at row {row}, against the direction of travel; smooth the \
+             positions, or omit them and give the speed",
+        if after < before { "decreases" } else { "increases" },
         rounded(*before, 9), rounded(*after, 9)
     )]
     RunsBack {
@@ -39,7 +40,8 @@ pub enum MotionFault {
     Directions,
     /// The position restarts.
     #[error(
-        "restarts at row {row}, from {} m to {} m; split the pass there",
+        "restarts at row {row}, from {} m to {} m, as a counter does that is reset or full; \
+             split the pass there into two files",
         rounded(*before, 9), rounded(*after, 9)
     )]
     Restarts {
@@ -102,6 +104,24 @@ pub enum MotionFault {
         /// Largest sufficient step in m.
         needed_m: f64,
     },
+}
+
+impl MotionFault {
+    /// The fault of positions whose signs were changed, in terms of the positions themselves.
+    pub(super) fn with_signs_changed(self) -> Self {
+        match self {
+            Self::RunsBack { row, before, after } => {
+                Self::RunsBack { row, before: -before, after: -after }
+            }
+            Self::Restarts { row, before, after } => {
+                Self::Restarts { row, before: -before, after: -after }
+            }
+            Self::Jumps { row, before, after, constant_from } => {
+                Self::Jumps { row, before: -before, after: -after, constant_from }
+            }
+            other => other,
+        }
+    }
 }
 
 /// The remedy of a jump: the rows before it in which the position did not change are wrong, too.

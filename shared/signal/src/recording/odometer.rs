@@ -11,7 +11,7 @@ const STAIR_SAMPLES: usize = 2;
 /// Number of steps below which an interpolation is impossible.
 const STEPS_MIN: usize = 4;
 /// Share of a pass's length by which a restarted position falls back.
-const RESTART: f64 = 0.5;
+const RESTART: f64 = 0.1;
 /// Longest step as a share of the sleeper spacing that separates sleepers.
 const STEPS_A_SPACING: f64 = 4.0;
 
@@ -69,25 +69,38 @@ impl Odometer {
     }
 }
 
+/// How many steps of the positions lead to smaller ones, and how many to greater ones.
+pub(super) fn steps_back_and_ahead(position_m: &[f64]) -> [usize; 2] {
+    let count = |is_it: fn(&f64, &f64) -> bool| {
+        position_m.windows(2).filter(|pair| is_it(&pair[1], &pair[0])).count()
+    };
+    [count(f64::lt), count(f64::gt)]
+}
+
 /// Checks that the position never decreases.
 fn forwards(position_m: &[f64]) -> Result<(), MotionFault> {
     let (first, last) = (position_m[0], position_m[position_m.len() - 1]);
     if position_m.iter().all(|&place| place == first) {
         return Err(MotionFault::StandsStill { row: 1, from_s: 0.0, to_s: None });
     }
-    let Some(index) = position_m.windows(2).position(|pair| pair[1] < pair[0]) else {
+    let falls = || position_m.windows(2).enumerate().filter(|(_, pair)| pair[1] < pair[0]);
+    let fall_m = |(_, pair): &(usize, &[f64])| pair[0] - pair[1];
+    let (Some((index, _)), Some(greatest)) =
+        (falls().next(), falls().max_by(|a, b| fall_m(a).total_cmp(&fall_m(b))))
+    else {
         return Ok(());
     };
-    let (row, before, after) = (index + 2, position_m[index], position_m[index + 1]);
+    let at = |index: usize| (index + 2, position_m[index], position_m[index + 1]);
     let ends = |ends: [f64; 2], &x: &f64| [ends[0].min(x), ends[1].max(x)];
     let [low, high] = position_m.iter().fold([f64::INFINITY, f64::NEG_INFINITY], ends);
-    let back = position_m.windows(2).filter(|pair| pair[1] < pair[0]).count();
-    let ahead = position_m.windows(2).filter(|pair| pair[1] > pair[0]).count();
+    let [back, ahead] = steps_back_and_ahead(position_m);
     Err(if back > ahead && last < first {
         MotionFault::Decreases { from_m: first, to_m: last }
-    } else if before - after > RESTART * (high - low) {
+    } else if fall_m(&greatest) > RESTART * (high - low) {
+        let (row, before, after) = at(greatest.0);
         MotionFault::Restarts { row, before, after }
     } else {
+        let (row, before, after) = at(index);
         MotionFault::RunsBack { row, before, after }
     })
 }

@@ -221,6 +221,30 @@ fn a_stated_sleeper_far_from_the_passes_is_refused_with_their_range() {
 }
 
 #[test]
+fn a_counter_that_restarts_is_refused_at_its_row_with_the_signs_of_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    // Reset to zero; 16 bits that count centimetres; a counter down to zero.
+    let reset = |row: usize, x: f64| if row < 12_000 { x } else { x - place(12_000) };
+    let full = |_, x: f64| (100.0 * x - 42_000.0).rem_euclid(65_536.0) / 100.0;
+    let down = |_, x: f64| (1100.0 - x).rem_euclid(655.36);
+    for (counter, said) in [
+        (&reset as &dyn Fn(usize, f64) -> f64, "restarts at row 12001, from 1112.323"),
+        (&full, "restarts at row 8052, from 655.3"),
+        (&down, "restarts at row 10684, from 0.00"),
+    ] {
+        let path = changed(folder.path(), |row, [t, x, acc]| [t, counter(row, x), acc]);
+        let text = complaint(&path, &layout());
+        assert!(text.contains(said) && !text.contains('-'), "{said}: {text}");
+        assert!(text.ends_with("split the pass there into two files"), "{text}");
+    }
+    let path = changed(folder.path(), |row, [t, x, acc]| {
+        [t, if row == 700 { 2000.01 - x } else { 2000.0 - x }, acc]
+    });
+    let text = complaint(&path, &layout());
+    assert!(text.contains("increases from 993.4565") && text.contains("at row 701"), "{text}");
+}
+
+#[test]
 fn coarse_clocks_are_straightened_and_gaps_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = changed(folder.path(), |_, [t, x, acc]| [(t * 100.0).floor() / 100.0, x, acc]);

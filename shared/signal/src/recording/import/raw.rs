@@ -2,7 +2,7 @@
 
 use super::super::error::{Fault, RecordingError};
 use super::super::folder::straightened;
-use super::super::odometer::Odometer;
+use super::super::odometer::{Odometer, steps_back_and_ahead};
 use super::super::{Pass, check};
 use super::places::Places;
 use super::unit::{Unit, of_column};
@@ -52,10 +52,10 @@ impl Raw {
         Ok(raw)
     }
 
-    /// Whether the last position is smaller than the first.
+    /// Whether most steps of the positions lead to smaller ones. A counter that restarts leads far back in one.
     pub(super) fn is_backwards(&self) -> bool {
-        let places = &self.places.position_m;
-        places[places.len() - 1] < places[0]
+        let [back, ahead] = steps_back_and_ahead(&self.places.position_m);
+        back > ahead
     }
 
     /// The pass, without the constant, along the direction of travel. What was done goes into `notes`, what
@@ -74,6 +74,7 @@ impl Raw {
         }
         let position_m = std::mem::take(&mut self.places.position_m);
         let odometer = Odometer::straightened(position_m, self.rate_hz, layout.spacing_m())
+            .map_err(|found| if is_backwards { found.with_signs_changed() } else { found })
             .map_err(|found| fault(found.into()))?;
         if layout.sleeper_m.is_some() {
             let told = odometer.tells_sleepers(layout.spacing_m());
