@@ -30,7 +30,7 @@ pub(super) fn read<const N: usize>(
             (0..present.len()).filter(|&index| present[index] == *name).collect();
         *place = match found[..] {
             [index] => index,
-            [] => return Err(fault(Fault::NoColumn { present })),
+            [] => return Err(fault(Fault::NoColumn { present, header: None })),
             _ => {
                 let places = found.iter().map(|index| index + 1).collect();
                 return Err(fault(Fault::ColumnTwice { places }));

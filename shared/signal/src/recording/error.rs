@@ -126,8 +126,8 @@ pub enum Fault {
     },
     /// A line has another number of fields than the others.
     #[error(
-        "line {line} has {fields} field{} where {expected} belong; complete or delete it, begin lines that are no rows with #, and separate decimal commas by another sign",
-        if *fields == 1 { "" } else { "s" }
+        "line {line} has {fields} field{} where {expected} belong; complete or delete it, begin lines that are no rows with #, and separate decimal commas by another sign{}",
+        if *fields == 1 { "" } else { "s" }, taken_as_header(*header)
     )]
     Fields {
         /// The line of the file, counted from 1.
@@ -136,16 +136,20 @@ pub enum Fault {
         fields: usize,
         /// How many the others have.
         expected: usize,
+        /// The line that was taken as the header, or as the first row, if this line is the next one.
+        header: Option<u64>,
     },
     /// The rows have a field more than the head has names, and the first one is no row name.
     #[error(
         "the header has {names} names, but the rows have {} fields, and the first field is \
-             not a row number; name every column",
-        names + 1
+             not a row number; name every column{}",
+        names + 1, taken_as_header(Some(*line))
     )]
     ShortHead {
         /// How many names there are.
         names: usize,
+        /// The line of the header, counted from 1.
+        line: u64,
     },
     /// Two columns have the same name.
     #[error("columns {} have this name; give each column a unique name", list(places))]
@@ -164,10 +168,15 @@ pub enum Fault {
         remedy: &'static str,
     },
     /// A column that is needed is absent.
-    #[error("the column is missing; rename one of the file's columns: {}", present.join(", "))]
+    #[error(
+        "the column is missing; rename one of the file's columns: {}{}",
+        present.join(", "), taken_as_header(*header)
+    )]
     NoColumn {
         /// The existing columns.
         present: Vec<String>,
+        /// The line of a text file that was taken as the header.
+        header: Option<u64>,
     },
     /// A column is not numeric.
     #[error("holds {kind}; store it as numbers")]
@@ -360,6 +369,16 @@ pub enum Fault {
         /// Where they end, in m.
         to_m: f64,
     },
+}
+
+/// What to do if the header is no header.
+fn taken_as_header(line: Option<u64>) -> String {
+    let hint = |line| {
+        format!(
+            " (line {line} was taken as the header: if it is a title, delete it or begin it with #)"
+        )
+    };
+    line.map_or_else(String::new, hint)
 }
 
 /// "2 and 4", "2, 4 and 5".

@@ -32,7 +32,7 @@ pub(super) fn read<const N: usize>(
         let places: Vec<usize> = named().map(|(index, _)| index + 1).collect();
         let Some((_, found)) = named().next() else {
             let present = all.iter().map(|column| column.name.clone()).collect();
-            return Err(fault(Fault::NoColumn { present }));
+            return Err(fault(Fault::NoColumn { present, header: None }));
         };
         if places.len() > 1 {
             return Err(fault(Fault::ColumnTwice { places }));

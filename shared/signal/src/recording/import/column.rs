@@ -34,11 +34,13 @@ pub(super) struct Content {
     pub columns: Vec<Column>,
     /// Assumptions made while reading, one sentence each.
     pub notes: Vec<String>,
+    /// The line of a text file that was taken as the header.
+    pub header: Option<u64>,
 }
 
 impl From<Vec<Column>> for Content {
     fn from(columns: Vec<Column>) -> Self {
-        Self { columns, notes: Vec::new() }
+        Self { columns, ..Self::default() }
     }
 }
 

@@ -3,6 +3,7 @@
 use super::super::error::{Fault, RecordingError};
 use super::column::{Column, Content, Oddity};
 use super::text;
+use super::unit::bare_unit;
 use std::path::Path;
 
 /// Reads all columns. For each column the first value that is not a number is recorded.
@@ -18,7 +19,7 @@ fn parse(text: &str) -> Result<Content, Fault> {
     let mut reader: Option<Reader> = None;
     each_row(text, separator, |line, fields| match &mut reader {
         None => {
-            reader = Some(Reader::begin(separator, fields));
+            reader = Some(Reader::begin(separator, line, fields));
             Ok(())
         }
         Some(reader) => reader.take(line, fields),
@@ -26,9 +27,12 @@ fn parse(text: &str) -> Result<Content, Fault> {
     reader.map_or_else(|| Err(Fault::Empty { rows: 0 }), Reader::finish)
 }
 
-/// The field separator: blanks or tabs if they separate numbers in the first line, else a semicolon
+/// The field separator: the one that a first line `sep=;` states; else blanks or tabs if they separate numbers in the first line, else a semicolon
 /// or tab if it has one, else a comma, else a blank.
 fn separator(text: &str) -> u8 {
+    if let Some(stated) = text.lines().next().and_then(stated_separator) {
+        return stated;
+    }
     let first = text.lines().find(|line| !line.trim().is_empty() && !is_remark(line));
     let line = first.unwrap_or_default();
     let fields = between_blanks(line);
@@ -38,8 +42,21 @@ fn separator(text: &str) -> u8 {
     [b';', b'\t', b','].into_iter().find(|&byte| line.as_bytes().contains(&byte)).unwrap_or(b' ')
 }
 
+/// The separator of a line `sep=;`, by which spreadsheets know it.
+fn stated_separator(line: &str) -> Option<u8> {
+    let line = line.trim_matches(['"', ' ', '\r']);
+    let (key, sign) = line.split_at_checked(4)?;
+    let is_one = key.eq_ignore_ascii_case("sep=") && sign.len() == 1;
+    is_one.then(|| sign.as_bytes()[0])
+}
+
 fn is_remark(line: &str) -> bool {
     line.trim_start().starts_with(['#', '%'])
+}
+
+/// Whether the first field of a line of several belongs to a line `sep=;`.
+fn begins_stated_separator(field: &str) -> bool {
+    field.eq_ignore_ascii_case("sep=")
 }
 
 /// Calls `take` with the line's number and the fields of every line but empty ones and remarks.
@@ -50,7 +67,7 @@ fn each_row(
 ) -> Result<(), Fault> {
     if separator == b' ' {
         for (line, text) in (1..).zip(text.lines()) {
-            if !is_remark(text) && !text.trim().is_empty() {
+            if !is_remark(text) && !text.trim().is_empty() && stated_separator(text).is_none() {
                 take(line, &between_blanks(text))?;
             }
         }
@@ -67,7 +84,7 @@ fn each_row(
     while reader.read_record(&mut record).map_err(broken)? {
         let fields: Vec<&str> = record.iter().collect();
         let is_empty = fields.iter().all(|field| field.is_empty());
-        if !is_empty && !is_remark(fields[0]) {
+        if !is_empty && !is_remark(fields[0]) && !begins_stated_separator(fields[0]) {
             take(record.position().map_or(0, csv::Position::line), &fields)?;
         }
     }
@@ -91,6 +108,8 @@ fn between_blanks(line: &str) -> Vec<&str> {
 /// A table while its rows come in.
 struct Reader {
     separator: u8,
+    /// The first line.
+    first: u64,
     names: Option<Vec<String>>,
     units: Vec<String>,
     rows: usize,
@@ -112,7 +131,7 @@ struct Reading {
 
 impl Reader {
     /// Begins with the first line: names, or the first row of numbers.
-    fn begin(separator: u8, fields: &[&str]) -> Self {
+    fn begin(separator: u8, first: u64, fields: &[&str]) -> Self {
         let is_name = |field: &&str| number(field, separator).is_none();
         // pandas writes the numbers of columns without names behind an empty one.
         let counts = |fields: &[&str]| {
@@ -122,6 +141,7 @@ impl Reader {
         let named = is_counted || fields.iter().all(is_name);
         let mut reader = Self {
             separator,
+            first,
             names: None,
             units: Vec::new(),
             rows: 0,
@@ -161,7 +181,10 @@ impl Reader {
         };
         if fields.len() != self.columns.len() {
             let (fields, expected) = (fields.len(), self.columns.len());
-            return Err(Fault::Fields { line, fields, expected });
+            // Later lines are at fault themselves.
+            let is_first = self.rows <= usize::from(self.names.is_none());
+            let header = is_first.then_some(self.first);
+            return Err(Fault::Fields { line, fields, expected, header });
         }
         self.append(fields);
         Ok(())
@@ -203,7 +226,7 @@ impl Reader {
         if self.row_names {
             let names = columns.len() - 1;
             if !is_row_name(&columns.remove(0)) {
-                return Err(Fault::ShortHead { names });
+                return Err(Fault::ShortHead { names, line: self.first });
             }
             self.notes.push(
                 "the header has one name less than the rows have fields: the first field of a row \
@@ -211,14 +234,16 @@ impl Reader {
                     .to_owned(),
             );
         }
+        let header = self.names.is_some().then_some(self.first);
         let name = |index: usize| format!("column-{}", index + 1);
         let names = self.names.unwrap_or_else(|| (0..columns.len()).map(name).collect());
         let units = self.units.into_iter().map(Some).chain(std::iter::repeat(None));
         for ((column, name), unit) in columns.iter_mut().zip(names).zip(units) {
             column.name = name;
+            let unit = unit.map(|unit| bare_unit(&unit).to_owned());
             column.unit = unit.filter(|unit| !unit.is_empty());
         }
-        Ok(Content { columns, notes: self.notes })
+        Ok(Content { columns, notes: self.notes, header })
     }
 }
 

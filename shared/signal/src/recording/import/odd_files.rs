@@ -118,7 +118,12 @@ fn units_stand_in_names_or_in_a_line_of_their_own() {
         let g = acceleration(row) / 9.806_65;
         format!("{};{};{g}", 1e3 * time(row), 1e-3 * place(row)).replace('.', ",")
     };
-    for head in ["t [ms];x [km];acc [g]\n", "t (ms);x (km);acc (g)\n", "t;x;acc\nms;km;g\n"] {
+    for head in [
+        "t [ms];x [km];acc [g]\n",
+        "t (ms);x (km);acc (g)\n",
+        "t;x;acc\nms;km;g\n",
+        "sep=;\nt;x;acc\n[ms];[km];(g)\n",
+    ] {
         let notes = sound(&table(folder.path(), head, row), &layout());
         assert!(notes.contains("is read in g"), "{notes}");
     }
@@ -127,6 +132,23 @@ fn units_stand_in_names_or_in_a_line_of_their_own() {
     let told = Layout { acceleration_unit: Some(AccelerationUnit::Unknown), ..layout() };
     let notes = one(&table(folder.path(), "t [ms];x [km];acc [mV]\n", row), &told).unwrap().notes;
     assert!(notes.iter().all(|note| !note.starts_with("doubt")), "{notes:?}");
+}
+
+#[test]
+fn a_title_before_the_header_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let row = |row: usize| {
+        format!("{};{};{}", time(row), place(row), acceleration(row)).replace('.', ",")
+    };
+    for title in ["Run 4711 of 3.5.2026", "Run seven", "Seven", "Run;;", "Run;seven"] {
+        let path = table(folder.path(), &format!("{title}\nt;x;acc\ns;m;m/s2\n"), row);
+        let text = complaint(&path, &layout());
+        let said =
+            "(line 1 was taken as the header: if it is a title, delete it or begin it with #)";
+        assert!(text.ends_with(said), "{title}: {text}");
+    }
+    sound(&table(folder.path(), "# Seven\nt;x;acc\ns;m;m/s2\n", row), &layout());
+    sound(&table(folder.path(), "SEP=;\r\nt;x;acc\r\n", row), &layout());
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use super::super::error::{Fault, RecordingError};
 use super::super::{limits, parquet_file};
-use super::column::{Column, Oddity};
+use super::column::{Column, Content, Oddity};
 use super::unit::bare_name;
 use super::{csv_table, foreign, matlab, numpy};
 use std::fs::File;
@@ -25,6 +25,8 @@ pub struct Table {
     pub columns: Vec<Column>,
     /// Assumptions made while reading, one sentence each.
     pub notes: Vec<String>,
+    /// The line of a text file that was taken as the header.
+    pub header: Option<u64>,
 }
 
 impl Table {
@@ -54,7 +56,8 @@ impl Table {
         if content.columns.is_empty() {
             return Err(fail(Fault::Empty { rows: 0 }));
         }
-        Ok(Self { path: path.to_owned(), columns: content.columns, notes: content.notes })
+        let Content { columns, notes, header } = content;
+        Ok(Self { path: path.to_owned(), columns, notes, header })
     }
 
     /// The column with this name, with or without a unit in the file. All values are finite, and there
@@ -81,7 +84,7 @@ impl Table {
             [index] => Ok(&self.columns[index]),
             [] => {
                 let present = self.columns.iter().map(|column| column.name.clone()).collect();
-                Err(Fault::NoColumn { present })
+                Err(Fault::NoColumn { present, header: self.header })
             }
             _ => Err(Fault::ColumnTwice { places: found.iter().map(|index| index + 1).collect() }),
         }

@@ -133,7 +133,7 @@ impl Unit for PositionUnit {
 impl Unit for SpeedUnit {
     const ALL: &'static [(Self, &'static [&'static str])] = &[
         (Self::KilometrePerHour, &["km/h", "kmh", "kmph", "kph"]),
-        (Self::MetrePerSecond, &["m/s", "mps", "ms-1"]),
+        (Self::MetrePerSecond, &["m/s", "mps", "ms-1", "m/sec", "ms"]),
     ];
     const REMEDY: &'static str = "use --speed-unit km/h or m/s";
 
@@ -195,6 +195,13 @@ pub(super) fn bare_name(name: &str) -> &str {
     in_brackets(name).map_or(name, |(bare, _)| bare)
 }
 
+/// A unit without brackets around it: "\[g\]" and "(g)" as "g".
+pub(super) fn bare_unit(unit: &str) -> &str {
+    let unit = unit.trim();
+    let within = |(opens, closes)| unit.strip_prefix(opens)?.strip_suffix(closes);
+    [('[', ']'), ('(', ')')].into_iter().find_map(within).map_or(unit, str::trim)
+}
+
 /// "acc \[g\]" and "acc (g)" as "acc" and "g".
 fn in_brackets(name: &str) -> Option<(&str, &str)> {
     let (name, unit) = [('[', ']'), ('(', ')')]
@@ -247,7 +254,9 @@ mod tests {
             assert_eq!((found.unwrap(), notes.len()), (expected, 1), "{name}");
         }
         assert_eq!(unit::<PositionUnit>("km", None).0.unwrap(), PositionUnit::Kilometre);
-        assert_eq!(unit::<SpeedUnit>("v_m_s", None).0.unwrap(), SpeedUnit::MetrePerSecond);
+        for name in ["v_m_s", "v_ms", "v [m/s]"] {
+            assert_eq!(unit::<SpeedUnit>(name, None).0.unwrap(), SpeedUnit::MetrePerSecond);
+        }
         assert_eq!(unit::<TimeUnit>("t [\u{b5}s]", None).0.unwrap(), TimeUnit::Microsecond);
         let (found, notes) = unit::<AccelerationUnit>("acc_left", None);
         assert_eq!(found.unwrap(), AccelerationUnit::MetrePerSecondSquared);
