@@ -7,6 +7,9 @@ use std::path::Path;
 /// Names of the columns of a pass, in the order they are written.
 pub(super) const NAMES: [&str; 3] = ["time_s", "position_m", "acceleration_m_s2"];
 
+/// Share of missing values up to which each is a fault of its row.
+const MISSING_MAX: f64 = 0.01;
+
 /// The columns of a pass: finite numbers, equally many, at least two.
 pub(super) struct Columns {
     /// Times in s.
@@ -44,12 +47,24 @@ fn check(path: &Path, columns: &[Vec<f64>; 3]) -> Result<(), RecordingError> {
         } else if column.len() != rows {
             Some(Fault::LengthMismatch { rows: column.len(), others: rows })
         } else {
-            let odd = column.iter().position(|value| !value.is_finite());
-            odd.map(|index| Fault::NotFinite { row: index + 1, value: column[index].to_string() })
+            sparse(column).or_else(|| not_finite(column))
         };
         if let Some(fault) = fault {
             return Err(RecordingError::new(path, name, fault));
         }
     }
     Ok(())
+}
+
+/// The fault of a column in which so many values are missing that it was sampled more slowly than the others.
+pub(super) fn sparse(column: &[f64]) -> Option<Fault> {
+    let missing = column.iter().filter(|value| !value.is_finite()).count();
+    let is_sparse = missing > 1 && missing as f64 > MISSING_MAX * column.len() as f64;
+    is_sparse.then_some(Fault::Sparse { missing, rows: column.len() })
+}
+
+/// The first value that is not finite.
+pub(super) fn not_finite(column: &[f64]) -> Option<Fault> {
+    let index = column.iter().position(|value| !value.is_finite())?;
+    Some(Fault::NotFinite { row: index + 1, value: column[index].to_string() })
 }

@@ -192,6 +192,14 @@ pub enum Fault {
         /// The value, as written.
         value: String,
     },
+    /// Many values are missing: a position or speed that is sampled more slowly than the accelerations.
+    #[error("{missing} of {rows} rows are empty or not finite numbers; {FINER}")]
+    Sparse {
+        /// How many values are missing.
+        missing: usize,
+        /// How many rows there are.
+        rows: usize,
+    },
     /// A code for a missing value.
     #[error(
         "row {row} is {value}, far from all other values: probably a code for a missing value; \
@@ -228,10 +236,7 @@ pub enum Fault {
         rows: usize,
     },
     /// Columns of one file differ in length.
-    #[error(
-        "has {rows} rows, but the other columns of the file have {others}; give all columns \
-         the same length"
-    )]
+    #[error("has {rows} rows, but the other columns of the file have {others}; {FINER}")]
     LengthMismatch {
         /// Rows of this column.
         rows: usize,
@@ -370,6 +375,11 @@ pub enum Fault {
         to_m: f64,
     },
 }
+
+/// What to do with a column that has fewer values than the accelerations.
+const FINER: &str = "interpolate positions and speeds to the times of the accelerations (for example with \
+                     numpy.interp), or import with --speed instead of this column; leave out rows without \
+                     acceleration";
 
 /// What to do if the header is no header.
 fn taken_as_header(line: Option<u64>) -> String {

@@ -226,6 +226,12 @@ fn a_value_that_is_no_number_is_named_by_its_row() {
         }
     }));
     assert!(text.starts_with("pass.csv: acceleration_m_s2: row 7 is NaN"), "{text}");
+    let text = csv_message(&csv(|index, values| {
+        if index % 10 != 0 {
+            values[1] = f64::NAN;
+        }
+    }));
+    assert!(text.starts_with("pass.csv: position_m: 1620 of 1800 rows are empty or"), "{text}");
 }
 
 #[test]

@@ -321,6 +321,15 @@ fn what_stands_for_a_number_or_for_another_column_is_named() {
         let text = complaint(&path, &layout());
         assert!(text.starts_with("run.csv: acc: row 77 is"), "{missing}: {text}");
     }
+    for missing in ["NaN", ""] {
+        let path = table(folder.path(), "t,x,acc\n", |row| {
+            let x = if row % 200 == 0 { place(row).to_string() } else { missing.to_owned() };
+            format!("{},{x},{}", time(row), acceleration(row))
+        });
+        let text = complaint(&path, &layout());
+        assert!(text.starts_with("run.csv: x: 19900 of 20000 rows are empty"), "{text}");
+        assert!(text.contains("numpy.interp), or import with --speed instead"), "{text}");
+    }
     let path = table(folder.path(), "t,x,acc\n", |row| {
         format!("2024-05-01 12:00:{},{},{}", time(row), place(row), acceleration(row))
     });

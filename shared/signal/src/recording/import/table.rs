@@ -1,5 +1,6 @@
 //! Named columns of numbers, independent of the file format.
 
+use super::super::columns::{not_finite, sparse};
 use super::super::error::{Fault, RecordingError};
 use super::super::{limits, parquet_file};
 use super::column::{Column, Content, Oddity};
@@ -65,7 +66,7 @@ impl Table {
     ///
     /// # Errors
     /// [`Fault::NoColumn`] with the names there are, [`Fault::ColumnTwice`], [`Fault::NotNumeric`],
-    /// [`Fault::NotFinite`] or [`Fault::Missing`] with the row, or [`Fault::Empty`].
+    /// [`Fault::NotFinite`] or [`Fault::Missing`] with the row, [`Fault::Sparse`], or [`Fault::Empty`].
     pub(super) fn column(&self, name: &str) -> Result<&Column, RecordingError> {
         let fault = |fault| RecordingError::new(&self.path, name, fault);
         let column = self.find(name).map_err(fault)?;
@@ -96,6 +97,9 @@ fn check(column: &Column) -> Option<Fault> {
     match &column.oddity {
         Some(Oddity::Kind(kind)) => return Some(Fault::NotNumeric { kind: kind.clone() }),
         Some(Oddity::Value { row, text }) => {
+            if let Some(sparse) = sparse(&column.values) {
+                return Some(sparse);
+            }
             return Some(Fault::NotFinite { row: *row, value: format!("\"{text}\"") });
         }
         None => {}
@@ -103,9 +107,8 @@ fn check(column: &Column) -> Option<Fault> {
     if column.values.len() < 2 {
         return Some(Fault::Empty { rows: column.values.len() });
     }
-    let odd = column.values.iter().position(|value| !value.is_finite());
-    odd.map(|index| Fault::NotFinite { row: index + 1, value: column.values[index].to_string() })
-        .or_else(|| missing(&column.values))
+    let values = &column.values;
+    sparse(values).or_else(|| not_finite(values)).or_else(|| missing(values))
 }
 
 /// A code for a missing value: a number far from all others.

@@ -134,8 +134,13 @@ fn numpy_arrays_matrices_and_archives_are_read() {
     let mut archive = zip::ZipWriter::new(fs::File::create(&path).unwrap());
     archive.start_file("acc.npy", zip::write::SimpleFileOptions::default()).unwrap();
     archive.write_all(&npy(&[ROWS as u64], &values)).unwrap();
+    archive.start_file("x.npy", zip::write::SimpleFileOptions::default()).unwrap();
+    archive.write_all(&npy(&[4], &[0.0, 0.5, 1.0, 1.5])).unwrap();
     archive.finish().unwrap();
     assert_eq!(samples(&path, &layout()), expected());
+    let text = complaint(&path, &Layout { position: Some("x".to_owned()), ..layout() });
+    assert!(text.starts_with("pass.npz: position: has 4 rows, but the other columns"), "{text}");
+    assert!(text.contains("numpy.interp"), "{text}");
 }
 
 #[test]
