@@ -4,6 +4,7 @@ use super::files::{Force, check, make_folder};
 use super::library_url::{open_or_create, open_whole};
 use super::progress::SectionStages;
 use super::recording::RecordingArgument;
+use super::shell::{quoted, quoted_path};
 use super::track::TrackOption;
 use super::{OrInput, Stop, evaluate, print_json, println_stderr, println_stdout};
 use crate::pipeline;
@@ -214,14 +215,14 @@ fn stop(error: SectionsError) -> Stop {
 fn origin(arguments: &Arguments) -> Origin {
     let Arguments { recording, models, library, track, out, confirm, without, .. } = arguments;
     let mut command = vec![format!("tracktwin diagnose {}", recording.typed())];
-    command.extend(models.as_ref().map(|models| format!("--models {}", models.display())));
+    command.extend(models.as_ref().map(|models| format!("--models {}", quoted_path(models))));
     let track = track.track.as_ref();
-    command.extend(track.map(|file| format!("--track {}", file.display())));
+    command.extend(track.map(|file| format!("--track {}", quoted_path(file))));
     let library = library.as_deref().map(without_password);
-    command.extend(library.as_ref().map(|library| format!("--library {library}")));
+    command.extend(library.as_ref().map(|library| format!("--library {}", quoted(library))));
     command.extend(without.iter().map(|physics| format!("--without {physics}")));
     command.extend(confirm.then(|| "--confirm".to_owned()));
-    command.push(format!("--out {}", out.display()));
+    command.push(format!("--out {}", quoted_path(out)));
     Origin {
         command: command.join(" "),
         version: format!("tracktwin {CODE_VERSION}"),

@@ -2,6 +2,7 @@
 
 use super::files::{Force, read_text};
 use super::numbers::number;
+use super::shell::quoted_path;
 use super::{OrInput, Stop, print_json, println_stdout};
 use anyhow::Context;
 use clap::{Args, ValueEnum};
@@ -189,8 +190,9 @@ fn print(imported: &Imported, folder: &Path) {
         println_stdout(note);
     }
     println_stdout(&format!(
-        "recording: {}; inspect it with: tracktwin inspect {0}",
-        folder.display()
+        "recording: {}; inspect it with: tracktwin inspect {}",
+        folder.display(),
+        quoted_path(folder)
     ));
 }
 

@@ -31,6 +31,7 @@ mod recording;
 mod reproduce;
 mod ring;
 mod run;
+mod shell;
 mod signals;
 mod simulate;
 mod status;

@@ -1,5 +1,6 @@
 //! The recording of a command, and the channel of which it takes the passes.
 
+use super::shell::{quoted, quoted_path};
 use super::{OrInput, Stop, println_stderr};
 use anyhow::anyhow;
 use clap::Args;
@@ -53,13 +54,13 @@ impl RecordingArgument {
         self.channel.open(&self.recording)
     }
 
-    /// The argument and options, as typed.
+    /// The argument and options, as typed in a shell.
     pub(super) fn typed(&self) -> String {
         let option = |name: &str, value: &Option<String>| {
-            value.as_ref().map(|value| format!(" --{name} {value}")).unwrap_or_default()
+            value.as_ref().map(|value| format!(" --{name} {}", quoted(value))).unwrap_or_default()
         };
         let Channel { rail, axle } = &self.channel;
-        format!("{}{}{}", self.recording.display(), option("rail", rail), option("axle", axle))
+        format!("{}{}{}", quoted_path(&self.recording), option("rail", rail), option("axle", axle))
     }
 }
 
@@ -100,4 +101,16 @@ fn usable(recording: &Recording) -> Result<(Recording, Vec<String>), Stop> {
         return Err(Stop::Input(anyhow!("{}: no pass is usable: {first}", recording.name)));
     }
     Ok((kept, pass_defects.iter().map(|why| format!("left out: {why}")).collect()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_recording_whose_path_contains_a_blank_is_typed_in_quotes() {
+        let channel = Channel { rail: Some("left rail".to_owned()), axle: Some("1".to_owned()) };
+        let argument = RecordingArgument { recording: "my runs/day-1".into(), channel };
+        assert_eq!(argument.typed(), "'my runs/day-1' --rail 'left rail' --axle 1");
+    }
 }
