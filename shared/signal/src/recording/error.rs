@@ -383,12 +383,9 @@ const FINER: &str = "interpolate positions and speeds to the times of the accele
 
 /// What to do if the header is no header.
 fn taken_as_header(line: Option<u64>) -> String {
-    let hint = |line| {
-        format!(
-            " (line {line} was taken as the header: if it is a title, delete it or begin it with #)"
-        )
-    };
-    line.map_or_else(String::new, hint)
+    line.map_or_else(String::new, |line| {
+        format!(" (line {line} was taken as the header: delete a title, or begin it with #)")
+    })
 }
 
 /// "2 and 4", "2, 4 and 5".

@@ -143,8 +143,7 @@ fn a_title_before_the_header_is_named() {
     for title in ["Run 4711 of 3.5.2026", "Run seven", "Seven", "Run;;", "Run;seven"] {
         let path = table(folder.path(), &format!("{title}\nt;x;acc\ns;m;m/s2\n"), row);
         let text = complaint(&path, &layout());
-        let said =
-            "(line 1 was taken as the header: if it is a title, delete it or begin it with #)";
+        let said = "(line 1 was taken as the header: delete a title, or begin it with #)";
         assert!(text.ends_with(said), "{title}: {text}");
     }
     sound(&table(folder.path(), "# Seven\nt;x;acc\ns;m;m/s2\n", row), &layout());
