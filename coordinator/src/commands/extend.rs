@@ -172,7 +172,9 @@ fn values(hypothesis: &Hypothesis, kind: &Kind, length_ratio: f64) -> String {
             continue;
         };
         // Writing to a string cannot fail.
-        let _ = if estimate.sd > 0.0 {
+        let _ = if !parameter.bound.is_continuous() {
+            writeln!(lines, "{name} = {:?}", estimate.mean.round())
+        } else if estimate.sd > 0.0 {
             let [low, high] = range(parameter, estimate);
             writeln!(
                 lines,
@@ -244,7 +246,8 @@ mod tests {
 
     #[test]
     fn every_range_is_within_the_bound_of_its_parameter() {
-        for parameter in Kind::all().flat_map(|kind| kind.parameters) {
+        let all = Kind::all().flat_map(|kind| kind.parameters);
+        for parameter in all.filter(|parameter| parameter.bound.is_continuous()) {
             for mean in [0.3, 0.7, 0.99] {
                 let [low, high] = range(parameter, &Estimate { mean, sd: 0.3 });
                 assert!(low < high, "{}: {low} to {high}", parameter.name);
@@ -252,6 +255,19 @@ mod tests {
                 assert!(holds, "{}: {low} to {high}", parameter.name);
             }
         }
+    }
+
+    /// A campaign refuses a range of whole numbers.
+    #[test]
+    fn an_order_is_one_number() {
+        let found = serde_json::json!({
+            "physics": "wheel_out_of_round", "probability": 0.97, "accepted": true,
+            "parameters": {"order": {"mean": 12.02, "sd": 0.1}},
+            "look_alikes": [], "would_separate": "", "detectability": 20.0, "log_evidence": 100.0,
+        });
+        let found: Hypothesis = serde_json::from_value(found).unwrap();
+        let kind = Kind::from_name(&found.physics).unwrap();
+        assert!(values(&found, kind, 1.0).starts_with("order = 12.0\n"));
     }
 
     #[test]

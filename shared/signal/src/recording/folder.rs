@@ -9,7 +9,7 @@ use super::selection::Selection;
 use super::sleeper::Sleeper;
 use super::track::doubts_on_names;
 use super::window::SleeperWindow;
-use super::{check, limits, parquet_file, quiet};
+use super::{check, limits, parquet_file, quiet, speed_change};
 use crate::Signal;
 use serde_json::{Map, Value};
 use std::ops::Range;
@@ -118,6 +118,7 @@ impl Recording {
         let gain_known = recording.gain_known();
         let quiet = recording.passes.iter().filter_map(|pass| quiet::doubt(pass, gain_known));
         doubts.extend(quiet);
+        doubts.extend(recording.passes.iter().filter_map(speed_change::doubt));
         // A recording that was read and written again states them already.
         doubts.retain(|doubt| !recording.doubts.contains(doubt));
         recording.doubts.extend(doubts);

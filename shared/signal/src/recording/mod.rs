@@ -21,6 +21,7 @@ mod part;
 mod quiet;
 mod selection;
 mod sleeper;
+mod speed_change;
 mod steps;
 #[cfg(test)]
 mod tests;

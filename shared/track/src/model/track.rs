@@ -68,7 +68,7 @@ pub enum ModelError {
 }
 
 impl TrackModel {
-    /// Assembles the track from one support per sleeper, then adds the extensions by their [`Stage`].
+    /// Assembles the track from one support per sleeper, then adds the extensions by their [`Stage`](crate::extension::Stage).
     ///
     /// # Errors
     /// [`ModelError`] names the invalid input.

@@ -29,6 +29,13 @@ impl Evidence<'_> {
             ));
         }
         notes.extend(lost(self.inspection, self.recording));
+        if self.inspection.flat.is_some() {
+            notes.push(
+                "The flat strikes other sleepers in every pass, so that the passes differ: weak effects of the track \
+                 are not visible beside it."
+                    .to_owned(),
+            );
+        }
         notes.extend(self.speed_disagreement().or_else(|| self.remainder(hypotheses)));
         notes.extend(self.inspection.findings.iter().map(Finding::sentence));
         notes

@@ -61,8 +61,6 @@ pub fn scale(recording: &Recording) -> Option<Scale> {
 
 /// Relative difference of the mean speeds in the two halves of a pass.
 fn drift(pass: &Pass) -> f64 {
-    let positions = &pass.position_m;
-    let half = positions.len() / 2;
-    let [first, second] = [0, half].map(|from| positions[from + half - 1] - positions[from]);
+    let [first, second] = pass.half_speeds_m_s();
     2.0 * (second - first).abs() / (second + first).abs()
 }
