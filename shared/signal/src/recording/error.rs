@@ -36,6 +36,9 @@ pub enum Fault {
         /// Message of the operating system or of the decoder.
         reason: String,
     },
+    /// A Parquet file has a compression that this program does not contain.
+    #[error("its compression is not supported; write it with zstd, snappy or none")]
+    Compression,
     /// A number is outside the limits of its quantity.
     #[error("{0}")]
     OutOfRange(QuantityError),

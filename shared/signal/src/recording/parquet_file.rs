@@ -45,12 +45,19 @@ pub(super) fn read<const N: usize>(
     Ok(columns)
 }
 
+/// Part of the decoder's message on a compression that it was built without.
+const DISABLED: &str = "Disabled feature at compile time";
+
 /// Reads all columns. A column that is not numeric states its type.
 ///
 /// Times, timestamps and durations become seconds; timestamps count from the first.
 pub(super) fn read_all(path: &Path) -> Result<Vec<Column>, RecordingError> {
     let unreadable = |error: ParquetError| {
-        RecordingError::new(path, "file", Fault::Unreadable { reason: error.to_string() })
+        let reason = error.to_string();
+        let is_compressed_otherwise = reason.contains(DISABLED);
+        let fault =
+            if is_compressed_otherwise { Fault::Compression } else { Fault::Unreadable { reason } };
+        RecordingError::new(path, "file", fault)
     };
     let file = File::open(path).map_err(|error| unreadable(error.into()))?;
     let reader = SerializedFileReader::new(file).map_err(unreadable)?;

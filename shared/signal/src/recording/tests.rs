@@ -249,6 +249,15 @@ fn a_file_that_is_no_parquet_is_refused() {
 }
 
 #[test]
+fn a_compression_that_is_not_supported_is_named() {
+    let folder = folder(|root| root["passes"][0]["file"] = json!("gzip.parquet"));
+    let file = include_bytes!("../../tests/gzip.parquet");
+    fs::write(folder.path().join("gzip.parquet"), file).unwrap();
+    let text = complaint(folder.path());
+    assert!(text.starts_with("gzip.parquet: file: its compression is not supported"), "{text}");
+}
+
+#[test]
 fn a_wrong_sample_rate_is_found_by_the_times() {
     let text = message(|root| root["sample_rate_Hz"] = json!(20000));
     assert!(

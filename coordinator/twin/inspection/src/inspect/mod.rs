@@ -60,6 +60,9 @@ pub struct Inspection {
     /// Passes that cannot be compared with a track, because their gain differs from that of another pass at their
     /// speed. Empty if fewer than two speeds would be left.
     pub of_other_gain: Vec<usize>,
+    /// Passes that cannot be compared with a track, because their signal drops out. Empty if fewer than two speeds would
+    /// be left.
+    pub dropped_out: Vec<usize>,
     /// The comb of wheel orders at one speed, from the first pass with a comb.
     pub comb: Option<Comb>,
 }
@@ -89,7 +92,7 @@ impl Inspection {
 
     /// Passes that cannot be compared with a track.
     pub fn not_compared(&self) -> Vec<usize> {
-        [&self.misplaced[..], &self.of_other_gain].concat()
+        [&self.misplaced[..], &self.of_other_gain, &self.dropped_out].concat()
     }
 
     /// The recording without the passes that cannot be compared with a track.
@@ -115,7 +118,12 @@ impl Inspection {
         };
         let of_position = (&self.misplaced, "positions differ from those");
         let of_gain = (&self.of_other_gain, "gain differs from that");
-        [of_position, of_gain].into_iter().filter_map(note).collect()
+        let dropped_out: Vec<&str> = self.dropped_out.iter().map(file).collect();
+        let of_signal = (!dropped_out.is_empty()).then(|| {
+            let files = dropped_out.join(", ");
+            format!("{files}: not compared with the track, because the signal drops out.")
+        });
+        [of_position, of_gain].into_iter().filter_map(note).chain(of_signal).collect()
     }
 
     /// What the passes leave open, a sentence each.
@@ -181,14 +189,14 @@ pub fn inspect(recording: &Recording) -> Inspection {
     let is_error = |pair: &Offsets| is_comparable(pair) && pair.ln_p() <= alarm;
     findings.extend(offsets.iter().filter(|pair| is_error(pair)).map(offset_finding));
     let misplaced = chain::misplaced(&offsets, is_error);
-    let misplaced = if leaves_speeds(recording, &misplaced) { misplaced } else { Vec::new() };
-    let mut of_other_gain =
-        chain::of_other_gain(recording, &gains, |gain| gain.is_error(EACH_TEST));
-    of_other_gain.retain(|pass| !misplaced.contains(pass));
-    if !leaves_speeds(recording, &[&misplaced[..], &of_other_gain].concat()) {
-        of_other_gain.clear();
-    }
+    let of_other_gain = chain::of_other_gain(recording, &gains, |gain| gain.is_error(EACH_TEST));
+    let drop_outs = drop_outs(recording, &pass_defects);
+    let dropped_out = drop_outs.iter().map(|(pass, _)| *pass).collect();
+    let [misplaced, of_other_gain, dropped_out] =
+        that_leave_speeds(recording, [misplaced, of_other_gain, dropped_out]);
     findings.extend(on_surface);
+    // The ends of a drop-out are no blows of the track.
+    findings.retain(|finding| !is_within(finding, &drop_outs));
     let loss_of_contact = chain::loss_of_contact(recording);
     if let Some(lost) = &loss_of_contact {
         findings.retain(|finding| !is_landing(finding, lost));
@@ -207,8 +215,28 @@ pub fn inspect(recording: &Recording) -> Inspection {
         offsets,
         misplaced,
         of_other_gain,
+        dropped_out,
         comb,
     }
+}
+
+/// Passes whose signal drops out, and the stretch in m, with a spacing on either side.
+fn drop_outs(recording: &Recording, pass_defects: &[PassDefect]) -> Vec<(usize, [f64; 2])> {
+    let stretch = |defect: &PassDefect| match *defect {
+        PassDefect::DropOut { pass, from_m, duration_s } => {
+            let to_m = from_m + duration_s * recording.passes[pass].mean_speed_m_s();
+            Some((pass, [from_m - recording.spacing_m, to_m + recording.spacing_m]))
+        }
+        _ => None,
+    };
+    pass_defects.iter().filter_map(stretch).collect()
+}
+
+/// Whether the middle of a finding lies in a stretch of a pass.
+fn is_within(finding: &Finding, stretches_m: &[(usize, [f64; 2])]) -> bool {
+    let Place::Stretch { from_m, to_m } = finding.place else { return false };
+    let middle_m = 0.5 * (from_m + to_m);
+    stretches_m.iter().any(|&(_, [from_m, to_m])| (from_m..=to_m).contains(&middle_m))
 }
 
 /// Whether one of two passes is saturated.
@@ -216,6 +244,22 @@ fn is_saturated(pair: &Offsets, pass_defects: &[PassDefect]) -> bool {
     pass_defects.iter().any(
         |defect| matches!(defect, PassDefect::Saturated { pass, .. } if pair.passes.contains(pass)),
     )
+}
+
+/// Each list of passes without those of the lists before it; empty if too few speeds would be left without its passes.
+fn that_leave_speeds<const N: usize>(
+    recording: &Recording,
+    lists: [Vec<usize>; N],
+) -> [Vec<usize>; N] {
+    let mut all: Vec<usize> = Vec::new();
+    lists.map(|mut list| {
+        list.retain(|pass| !all.contains(pass));
+        if !leaves_speeds(recording, &[&all[..], &list].concat()) {
+            return Vec::new();
+        }
+        all.extend(&list);
+        list
+    })
 }
 
 /// Whether two speeds are left without these passes; one of a recording at one speed.

@@ -69,6 +69,26 @@ fn passes_that_are_mostly_clipped_are_not_laid_on_each_other() {
     assert!(finds(&clipped, CLIPPING.physics) && !finds(&clipped, POSITION_ERROR.physics));
 }
 
+#[test]
+fn a_pass_that_drops_out_is_left_out_and_its_ends_are_no_blows() {
+    let silent = |samples: &mut [f64]| {
+        let from = samples.len() / 2;
+        samples[from..from + (0.02 * Rolled::RATE_HZ) as usize].fill(0.0);
+    };
+    let in_one = |pass: usize, samples: &mut [f64], _: &mut [f64]| {
+        if pass == 1 {
+            silent(samples);
+        }
+    };
+    let found = |chain: &Chain<'_>| inspect(&Rolled { chain, ..Rolled::faultless(6) }.recording());
+    let inspection = found(&in_one);
+    assert_eq!(inspection.not_compared(), [1], "{:?}", inspection.pass_defects);
+    // No speed is left without them.
+    let inspection = found(&|_, samples: &mut [f64], _: &mut [f64]| silent(samples));
+    assert!(inspection.not_compared().is_empty() && inspection.findings.is_empty());
+    assert!(!inspection.pass_defects.is_empty());
+}
+
 /// Circumference in m of the wheel of long passes.
 const TURN_M: f64 = 2.856;
 
