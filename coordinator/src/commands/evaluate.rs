@@ -82,7 +82,7 @@ pub(super) struct Arguments {
     out: PathBuf,
     #[command(flatten)]
     track: TrackOption,
-    /// Diagnosis of this recording (diagnosis.json): the physics that it accepted becomes part of the track
+    /// Diagnosis of this recording (diagnosis.json, or its folder): the physics that it accepted becomes part of the track
     /// model of the inversion.
     #[arg(long, value_name = "FILE", conflicts_with = "models")]
     from: Option<PathBuf>,

@@ -42,7 +42,7 @@ Exit codes: 0 done; 2 wrong input, or the diagnosis accepted no physics; 3 failu
 pub(super) struct Arguments {
     /// Campaign file (TOML) to extend.
     campaign: PathBuf,
-    /// Diagnosis written by `diagnose` (diagnosis.json).
+    /// Diagnosis written by `diagnose` (diagnosis.json, or its folder).
     #[arg(long, value_name = "FILE")]
     from: PathBuf,
     /// New campaign file [default: CAMPAIGN-extended.toml beside the old one].
@@ -124,8 +124,10 @@ fn check_spacing(path: &Path, campaign: &Campaign, diagnosis: &Diagnosis) -> any
     }
 }
 
-/// Reads a diagnosis.
+/// Reads a diagnosis: its file, or the folder that `diagnose` wrote.
 pub(super) fn diagnosis(path: &Path) -> anyhow::Result<Diagnosis> {
+    let inside = path.join("diagnosis.json");
+    let path = if path.is_dir() { &inside } else { path };
     let name = path.display();
     let diagnosis: Diagnosis = serde_json::from_slice(&read(path)?).with_context(|| {
         format!("{name}: not a diagnosis; give the diagnosis.json of `tracktwin diagnose`")
@@ -268,6 +270,14 @@ mod tests {
         let found: Hypothesis = serde_json::from_value(found).unwrap();
         let kind = Kind::from_name(&found.physics).unwrap();
         assert!(values(&found, kind, 1.0).starts_with("order = 12.0\n"));
+    }
+
+    #[test]
+    fn the_folder_of_a_diagnosis_stands_for_its_file() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("diagnosis.json"), "{}").unwrap();
+        let refused = diagnosis(folder.path()).unwrap_err().to_string();
+        assert!(refused.contains("diagnosis.json: not a diagnosis"), "{refused}");
     }
 
     #[test]

@@ -36,6 +36,10 @@ const DEVIATIONS_MIN: f64 = 3.0;
 /// distances are wrong. Bolts under a part of the sleepers turn the phase along the track by 0.12.
 const ENDS_MIN: f64 = 0.18;
 
+/// Smallest ratio of the contrasts with and without an error of the stated distances. A phase that turns by 0.36 along the
+/// track halves the contrast of a clear pattern.
+const CONTRAST_RATIO_MIN: f64 = 1.5;
+
 /// Largest error of the stated distances that is searched, as a share of them.
 const SCALE_MAX: f64 = 0.03;
 
@@ -140,10 +144,15 @@ impl SleeperPattern {
         let found = of(scale);
         // A straight line through phases of equal scatter.
         let deviation = found.deviation_m / spacing_m * 12f64.sqrt() / length;
-        let is_known = scale.abs() > (2.0 * ENDS_MIN / length).max(DEVIATIONS_MIN * deviation);
-        let kept = if is_known { scale } else { 0.0 };
+        let without = of(0.0);
+        let is_known = scale.abs() > (2.0 * ENDS_MIN / length).max(DEVIATIONS_MIN * deviation)
+            && found.contrast > CONTRAST_RATIO_MIN * without.contrast;
         let half_length_m = 0.5 * (length - 1.0) * spacing_m;
-        Self { distance_ratio: 1.0 + kept, half_length_m, ..of(kept) }
+        if is_known {
+            Self { distance_ratio: 1.0 + scale, half_length_m, ..found }
+        } else {
+            Self { half_length_m, ..without }
+        }
     }
 
     /// The pattern of spans whose phases differ by chance only.
