@@ -103,7 +103,7 @@ pub async fn diagnose(
     inspection.forget(allowed);
     if let Some(orders) = shuffle {
         inspection.ignore();
-        let (speeds, sleepers) = (prepared.pass_numbers.len(), prepared.forward.section.sleepers);
+        let (speeds, sleepers) = (prepared.pass_numbers.len(), prepared.forward.section.sleepers());
         prepared.shuffle(&orders(speeds, sleepers));
     }
     let suggested = prepared.suggested(&inspection);

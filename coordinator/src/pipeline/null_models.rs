@@ -57,7 +57,7 @@ pub async fn of(
         model_hash: MODEL_HASH,
         design: &forward.section.track.design,
         wavelengths_m: forward.section.track.wavelengths_m,
-        sleepers: forward.section.sleepers,
+        sleepers: forward.section.sleepers(),
         version: NullModel::VERSION,
         speeds_m_s: &forward.speeds_m_s,
         bands_hz: forward.bands.centres_hz(),

@@ -113,7 +113,7 @@ impl Unknowns {
         let (knots, response_knots) = (knots(wave_numbers), knots(frequencies_hz));
         let known = &section.track.prior;
         Self {
-            sleepers: section.sleepers,
+            sleepers: section.sleepers(),
             speeds,
             knots,
             response_knots,

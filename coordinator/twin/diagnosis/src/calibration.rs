@@ -130,7 +130,7 @@ impl Problem<'_> {
     /// # Errors
     /// [`CalibrationError`] if no track or extension exists for the values.
     pub fn inexactness(&self, values: &DVector<f64>) -> Result<Vec<f64>, CalibrationError> {
-        let sleepers = self.forward.section.sleepers;
+        let sleepers = self.forward.section.sleepers();
         let is_local = |candidate: &Candidate| {
             let acting = candidate.extension.sleepers.as_ref().map(Vec::len);
             !candidate.is_everywhere() && acting.is_none_or(|acting| 2 * acting <= sleepers)
@@ -238,7 +238,7 @@ impl Problem<'_> {
         let mut near: Vec<usize> = sleepers
             .flatten()
             .flat_map(|sleeper| sleeper.saturating_sub(LOADED)..=sleeper + LOADED)
-            .filter(|sleeper| *sleeper < self.forward.section.sleepers)
+            .filter(|sleeper| *sleeper < self.forward.section.sleepers())
             .collect();
         near.sort_unstable();
         near.dedup();

@@ -168,23 +168,23 @@ impl Place {
 }
 
 fn places(places: Places, section: &Section) -> Vec<Place> {
-    let single = || (0..section.sleepers).map(|sleeper| Place::Sleepers(vec![sleeper]));
+    let single = || (0..section.sleepers()).map(|sleeper| Place::Sleepers(vec![sleeper]));
     match places {
         Places::Everywhere => vec![Place::Everywhere],
         Places::Sleepers => single().collect(),
         Places::SleepersAndPairs => {
-            let pairs = (1..section.sleepers).map(|it| Place::Sleepers(vec![it - 1, it]));
+            let pairs = (1..section.sleepers()).map(|it| Place::Sleepers(vec![it - 1, it]));
             single().chain(pairs).collect()
         }
         Places::Points => {
             // Above each sleeper and in the middle of each span.
             let ends = |half: usize| [half / 2, half.div_ceil(2)].map(|it| section.x_m(it));
             let point = |half| Place::Point(0.5 * ends(half).iter().sum::<f64>());
-            (0..2 * section.sleepers - 1).map(point).collect()
+            (0..2 * section.sleepers() - 1).map(point).collect()
         }
         Places::Patterns => {
             let patterns = (2..=5).flat_map(|every| (0..every).map(move |first| (every, first)));
-            let pattern = |(every, first)| (first..section.sleepers).step_by(every).collect();
+            let pattern = |(every, first)| (first..section.sleepers()).step_by(every).collect();
             patterns.map(pattern).map(Place::Sleepers).collect()
         }
     }

@@ -150,11 +150,11 @@ impl Confirming<'_> {
         let forward = &self.prepared.forward;
         let of = |candidate: &Candidate| {
             if candidate.is_everywhere() {
-                return 0..forward.section.sleepers;
+                return 0..forward.section.sleepers();
             }
             let extent = Extent::of(candidate, &forward.section).with_reach();
             let [from, to] = extent.spacings().map(|spacings| spacings.max(0.0));
-            from.floor() as usize..(to.ceil() as usize + 1).min(forward.section.sleepers)
+            from.floor() as usize..(to.ceil() as usize + 1).min(forward.section.sleepers())
         };
         let all: Vec<Range<usize>> = self.search.accepted.iter().map(of).collect();
         let start = all.iter().map(|range| range.start).min().unwrap_or(0);

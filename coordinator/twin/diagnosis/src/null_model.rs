@@ -305,7 +305,7 @@ fn simulate(
 fn pass(section: &Section, speed_m_s: f64) -> Pass {
     let spacing_m = section.track.design.sleeper.spacing_m;
     let first_m = section.model_x_m(section.x_m(0));
-    let last_m = first_m + (section.sleepers - 1) as f64 * spacing_m;
+    let last_m = first_m + (section.sleepers() - 1) as f64 * spacing_m;
     Pass {
         speed_m_s,
         start_m: first_m - RUN_IN_SPANS * spacing_m,
@@ -319,7 +319,7 @@ fn windows(section: &Section, pass: &Pass) -> Vec<Option<Range<usize>>> {
     let spacing_m = section.track.design.sleeper.spacing_m;
     let first_m = section.model_x_m(section.x_m(0)) - pass.start_m;
     let sample = |x_m: f64| (x_m / (pass.speed_m_s * pass.time_step_s)).round() as usize;
-    (0..section.sleepers)
+    (0..section.sleepers())
         .map(|sleeper| {
             let middle_m = first_m + sleeper as f64 * spacing_m;
             Some(sample(middle_m - 0.5 * spacing_m)..sample(middle_m + 0.5 * spacing_m))

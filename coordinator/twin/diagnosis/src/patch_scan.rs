@@ -110,7 +110,7 @@ impl Patch {
 impl PatchScan {
     /// Computes the filters for a calibrated track.
     pub(crate) fn new(problem: &Problem<'_>, current: &Calibration) -> Self {
-        let sleepers = problem.forward.section.sleepers;
+        let sleepers = problem.forward.section.sleepers();
         let shapes: Vec<Shape> =
             kept(problem).into_par_iter().map(|fixed| shape(problem, current, fixed)).collect();
         let most = (SHARE_MAX * sleepers as f64) as usize;
@@ -128,7 +128,7 @@ impl PatchScan {
         current: &Calibration,
         fixed: Fixed,
     ) -> Self {
-        let sleepers = problem.forward.section.sleepers;
+        let sleepers = problem.forward.section.sleepers();
         let shapes = vec![shape(problem, current, fixed)];
         let filters = filters(0, &shapes[0], current, &runs(1..=sleepers, sleepers)).collect();
         Self { shapes, filters, sleepers }
@@ -199,7 +199,7 @@ fn steps([from, to]: [f64; 2]) -> impl Iterator<Item = f64> {
 
 fn shape(problem: &Problem<'_>, current: &Calibration, fixed: Fixed) -> Shape {
     let forward = problem.forward;
-    let sleepers = forward.section.sleepers;
+    let sleepers = forward.section.sleepers();
     let centres = forward.bands.centres_hz();
     let level = |row: usize| {
         let (_, speed, band) = forward.place(row);

@@ -1,16 +1,15 @@
 //! A recording prepared for diagnosis, or the reason why this is impossible.
 
+mod measured;
 mod sleepers;
 
 pub use self::sleepers::{Uncovered, check_length, short_passes};
 pub(crate) use self::sleepers::{covers, overlapping};
 
-use self::sleepers::{compared, too_short};
-use crate::bands::Bands;
+use self::measured::Measured;
 use crate::forward::Forward;
 use crate::null_model::NullModel;
 use crate::observation::leave_out;
-use crate::section::Section;
 use crate::spectra::{Spectra, SpeedSpectra, are_one_speed};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
@@ -20,10 +19,6 @@ use tracktwin_parameters::{Track, TrackDesign};
 use tracktwin_signal::recording::{OtherTrack, Recording};
 use tracktwin_track::extension::Kind;
 use tracktwin_track::model::ContactPatch;
-
-/// Lowest band times the time in which the fastest pass crosses a sleeper spacing. Below this frequency a
-/// window is shorter than a wavelet. 80 Hz on V-Track at 13 km/h.
-const LOWEST_PERIODS: f64 = 80.0 * 0.125 * 3.6 / 13.0;
 
 /// Highest band in Hz if the sample rate permits; the irregularity is negligible above it.
 const HIGHEST_HZ: f64 = 5100.0;
@@ -37,10 +32,7 @@ pub fn highest_compared_hz(sample_rate_hz: f64) -> f64 {
     HIGHEST_HZ.min(SAMPLE_RATE_SHARE * sample_rate_hz)
 }
 
-/// Smallest number of bands for a diagnosis.
-const BANDS_MIN: usize = 12;
-
-/// Smallest number of neighbouring sleepers that all passes must cover.
+/// Smallest number of neighbouring sleepers that must be covered at every speed.
 const SLEEPERS_MIN: usize = 6;
 
 /// Margin that a pass must cover beyond a sleeper's window, as a share of the spacing; low bands depend on
@@ -50,10 +42,6 @@ const MARGIN_SPANS: f64 = 0.6;
 /// Largest deviation of the distance of two neighbouring sleepers from the spacing, as a share of the
 /// spacing; the sleepers of the model are evenly spaced.
 const UNEVEN: f64 = 0.1;
-
-/// Relative step to which a true speed is rounded from the nominal speed. Passes close to the nominal speed
-/// thus share their null simulations.
-const SPEED_STEP: f64 = 5e-3;
 
 /// Reason why a recording cannot be diagnosed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -168,83 +156,10 @@ pub fn check_track(recording: &Recording, design: &TrackDesign) -> Result<(), Pr
     }
 }
 
-/// Band powers of a recording, and its comparable sleepers.
-struct Measured {
-    bands: Bands,
-    spectra: Spectra,
-    sleepers: Range<usize>,
-    uncovered: Uncovered,
-}
-
-impl Measured {
-    fn of(
-        recording: &Recording,
-        design: &TrackDesign,
-        except: &[usize],
-    ) -> Result<Self, PreparationError> {
-        check_track(recording, design)?;
-        let (sleepers, uncovered) = compared(recording, except);
-        let except = &[except, &uncovered.short_passes].concat();
-        let passes = recording.passes.iter().enumerate().filter(|(it, _)| !except.contains(it));
-        let fastest = passes.map(|(_, pass)| pass.speed_km_h).fold(0.0, f64::max);
-        let lowest_hz = LOWEST_PERIODS * fastest / 3.6 / design.sleeper.spacing_m;
-        let highest_hz = highest_compared_hz(recording.sample_rate_hz);
-        let bands = Bands::new(lowest_hz, highest_hz.max(lowest_hz));
-        if bands.count() < BANDS_MIN {
-            return Err(PreparationError::SampleRate(recording.sample_rate_hz));
-        }
-        if recording.sleepers.is_empty() {
-            return Err(PreparationError::NoSleepers);
-        }
-        if !recording.gain_known() {
-            return Err(PreparationError::GainUnknown);
-        }
-        if sleepers.len() < SLEEPERS_MIN {
-            return Err(too_short(recording, sleepers.len()));
-        }
-        let spectra = Spectra::new(recording, &bands, except);
-        Ok(Self { bands, spectra, sleepers, uncovered })
-    }
-
-    /// Prepares a range of the sleepers.
-    fn prepared(
-        &self,
-        recording: &Recording,
-        track: &Track,
-        sleepers: Range<usize>,
-    ) -> PreparedRecording {
-        let Self { bands, spectra, .. } = self;
-        let x_m = recording.sleepers[sleepers.clone()].iter().map(|sleeper| sleeper.x_m).collect();
-        let section = Section::at(track.clone(), x_m);
-        let reach_m = (0.5 + MARGIN_SPANS) * recording.spacing_m;
-        let stretch_m = [section.x_m(0) - reach_m, section.x_m(sleepers.len() - 1) + reach_m];
-        let speed = |speed: &SpeedSpectra| true_speed(recording, speed, stretch_m);
-        let speeds: Vec<f64> = spectra.speeds.iter().map(speed).collect();
-        let noise = spectra.speeds.iter().map(|speed| speed.noise_density).collect();
-        let forward = Forward::new(section, bands.clone(), &speeds, noise);
-        let log_power = log_power(&forward, spectra, sleepers.start);
-        let pass_variance = pass_variance(&forward, spectra, sleepers.clone());
-        let passes_repeat = spectra.speeds.iter().any(|speed| speed.pass_variance().is_some());
-        let pass_numbers = spectra.speeds.iter().map(|speed| speed.passes.clone()).collect();
-        let (first_sleeper, without, detected_shapes_m) = (sleepers.start, Vec::new(), Vec::new());
-        PreparedRecording {
-            forward,
-            log_power,
-            pass_variance,
-            first_sleeper,
-            pass_numbers,
-            passes_repeat,
-            uncovered: self.uncovered.clone(),
-            without,
-            detected_shapes_m,
-        }
-    }
-}
-
 impl PreparedRecording {
     /// Indices in the recording of the compared sleepers.
     pub fn sleepers(&self) -> Range<usize> {
-        self.first_sleeper..self.first_sleeper + self.forward.section.sleepers
+        self.first_sleeper..self.first_sleeper + self.forward.section.sleepers()
     }
 
     /// Prepares a recording for comparison with `track`, without the passes with the indices `except`.
@@ -309,7 +224,7 @@ impl PreparedRecording {
             let speed_km_h = recording.passes[passes[0]].speed_km_h;
             let is_it = |speed: &&SpeedSpectra| are_one_speed(speed.speed_km_h, speed_km_h);
             let Some(speed) = spectra.speeds.iter().find(is_it) else { continue };
-            for sleeper in 0..forward.section.sleepers {
+            for sleeper in 0..forward.section.sleepers() {
                 let Some(mean) = speed.mean(self.first_sleeper + sleeper) else { continue };
                 let row = sleeper * forward.per_sleeper() + number * forward.bands.count();
                 for (value, mean) in all[row..].iter_mut().zip(mean) {
@@ -323,7 +238,7 @@ impl PreparedRecording {
     /// The log powers minus the offset of the null model: the values that the forward model predicts if
     /// nothing is left out.
     pub fn expected_log_power(&self, null: &NullModel) -> DVector<f64> {
-        &self.log_power - null.offset_of(self.forward.section.sleepers)
+        &self.log_power - null.offset_of(self.forward.section.sleepers())
     }
 
     /// Covariance of the log powers of one sleeper: that of the null model plus the variation between
@@ -351,50 +266,4 @@ impl PreparedRecording {
         }
         covariance
     }
-}
-
-/// Mean speed in km/h of the passes of a speed over a stretch, from their positions, rounded in steps of
-/// [`SPEED_STEP`] from the nominal speed.
-fn true_speed(recording: &Recording, speed: &SpeedSpectra, [from_m, to_m]: [f64; 2]) -> f64 {
-    let of_pass = |&pass: &usize| -> Option<f64> {
-        let pass = &recording.passes[pass];
-        let sample = |x_m: f64| pass.position_m.partition_point(|&position| position < x_m);
-        let last = pass.position_m.len() - 1;
-        let [from, to] = [from_m, to_m].map(|x_m| sample(x_m).min(last));
-        let way_m = pass.position_m[to] - pass.position_m[from];
-        let speed_km_h = 3.6 * way_m * pass.signal.sample_rate_hz() / (to - from).max(1) as f64;
-        // A pass may lie elsewhere.
-        (way_m > 0.0).then_some(speed_km_h)
-    };
-    let all: Vec<f64> = speed.passes.iter().filter_map(of_pass).collect();
-    let mean = all.iter().sum::<f64>() / all.len() as f64;
-    let steps = ((mean / speed.speed_km_h - 1.0) / SPEED_STEP).round();
-    speed.speed_km_h * (1.0 + SPEED_STEP * steps)
-}
-
-fn log_power(forward: &Forward, spectra: &Spectra, first: usize) -> DVector<f64> {
-    let mut all = DVector::zeros(forward.count());
-    for sleeper in 0..forward.section.sleepers {
-        for (number, speed) in spectra.speeds.iter().enumerate() {
-            let Some(mean) = speed.mean(first + sleeper) else { continue };
-            let row = sleeper * forward.per_sleeper() + number * forward.bands.count();
-            all.rows_mut(row, mean.len()).copy_from_slice(&mean);
-        }
-    }
-    all
-}
-
-/// Variance of the mean over the passes that cover a sleeper, per speed and band, in the mean over some sleepers. Where no
-/// passes at a speed share sleepers, the variance of another speed is taken, or 0.01 if there is none.
-fn pass_variance(forward: &Forward, spectra: &Spectra, sleepers: Range<usize>) -> DVector<f64> {
-    let bands = forward.bands.count();
-    let known: Vec<_> = spectra.speeds.iter().map(SpeedSpectra::pass_variance).collect();
-    let typical = known.iter().flatten().next().cloned().unwrap_or(vec![0.01; bands]);
-    let of_speed = |(variance, speed): (&Option<Vec<f64>>, &SpeedSpectra)| {
-        let share = |sleeper: usize| 1.0 / speed.covering(sleeper).count().max(1) as f64;
-        let share = sleepers.clone().map(share).sum::<f64>() / sleepers.len() as f64;
-        let variance = variance.as_ref().unwrap_or(&typical);
-        variance.iter().map(|value| share * value).collect::<Vec<_>>()
-    };
-    DVector::from_vec(known.iter().zip(&spectra.speeds).flat_map(of_speed).collect())
 }

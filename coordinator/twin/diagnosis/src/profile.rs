@@ -61,7 +61,7 @@ impl Shape {
             let middle_m = section.model_x_m(section.x_m(sleeper));
             squares(&transform, step_m, spacing_m, |offset_m| height_m(middle_m + offset_m))
         };
-        let squares: Vec<_> = (0..section.sleepers).map(of).collect();
+        let squares: Vec<_> = (0..section.sleepers()).map(of).collect();
         squares.iter().any(Option::is_some).then_some(Self { squares, step_m, spacing_m, patch })
     }
 

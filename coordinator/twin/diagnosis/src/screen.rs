@@ -61,7 +61,7 @@ pub fn templates(
             let extensions = [&accepted[..], &[built.ok()?]].concat();
             let transfer = forward.transfer_beside(&known, &calibration.values, &extensions);
             let sleepers = if candidate.is_everywhere() {
-                0..section.sleepers
+                0..section.sleepers()
             } else {
                 forward.felt_at(Extent::of(candidate, section).spacings())
             };

@@ -59,8 +59,6 @@ pub(crate) fn blur_m(speed_m_s: f64, centre_hz: f64) -> f64 {
 pub struct Section {
     /// Track description with its priors.
     pub track: Track,
-    /// Number of compared sleepers.
-    pub sleepers: usize,
     /// Positions of the compared sleepers in m, in the coordinates of the recording.
     pub(crate) sleepers_x_m: Vec<f64>,
     /// Number of spans modelled beyond the first and the last compared sleeper. The continuation of the
@@ -81,8 +79,12 @@ impl Section {
     /// model's sleepers are evenly spaced: a position between two sleepers divides the model's span as it divides
     /// theirs.
     pub fn at(track: impl Into<Track>, sleepers_x_m: Vec<f64>) -> Self {
-        let (track, sleepers) = (track.into(), sleepers_x_m.len());
-        Self { track, sleepers, sleepers_x_m, spans_beyond: SPANS_BEYOND }
+        Self { track: track.into(), sleepers_x_m, spans_beyond: SPANS_BEYOND }
+    }
+
+    /// Number of compared sleepers.
+    pub const fn sleepers(&self) -> usize {
+        self.sleepers_x_m.len()
     }
 
     /// Whether the track is V-Track, on which error rates of diagnoses were measured (docs/trial.md).
@@ -97,7 +99,7 @@ impl Section {
 
     /// Number of spans of the whole track.
     pub fn spans(&self) -> usize {
-        self.sleepers - 1 + 2 * self.spans_beyond
+        self.sleepers() - 1 + 2 * self.spans_beyond
     }
 
     /// Distance of the furthest wheel from the measuring one, in spacings.
@@ -120,7 +122,7 @@ impl Section {
     }
 
     const fn last(&self) -> usize {
-        self.spans_beyond + self.sleepers - 1
+        self.spans_beyond + self.sleepers() - 1
     }
 
     /// Index of the rail node above a compared sleeper.
@@ -142,7 +144,7 @@ impl Section {
     /// Number of spans, with fractions, from the first compared sleeper to a position of the recording in m.
     pub(crate) fn spans_from_first(&self, x_m: f64) -> f64 {
         let x = &self.sleepers_x_m;
-        let last = x.len() - 1;
+        let last = self.sleepers() - 1;
         let spacing_m = self.track.design.sleeper.spacing_m;
         if x_m <= x[0] {
             return (x_m - x[0]) / spacing_m;
@@ -205,7 +207,7 @@ impl Section {
             let bands = bands.centres_hz().iter();
             bands.map(|&hz| self.window(sleeper, speed_m_s, hz)).collect()
         };
-        (0..self.sleepers).map(of).collect()
+        (0..self.sleepers()).map(of).collect()
     }
 }
 

@@ -54,6 +54,8 @@ pub struct SleeperPattern {
     pub shift_m: f64,
     /// Distances of the sleepers divided by the stated ones; 1 if no error is distinguishable.
     pub distance_ratio: f64,
+    /// Standard deviation of this ratio.
+    pub ratio_deviation: f64,
     /// Distance in m from the middle to the first and the last span.
     pub half_length_m: f64,
     /// Standard deviation of the distance in m.
@@ -115,12 +117,12 @@ impl SleeperPattern {
     }
 
     fn wrong_scale(&self) -> String {
-        let Self { shift_m, distance_ratio, half_length_m, .. } = *self;
+        let Self { shift_m, distance_ratio, ratio_deviation, half_length_m, .. } = *self;
         let [first_m, last_m] =
             [-half_length_m, half_length_m].map(|x_m| shift_m + (distance_ratio - 1.0) * x_m);
         format!(
-            "By the levels within a span, the distances of the sleepers are {distance_ratio:.4} times the stated ones in \
-             all passes: the sleepers lie {first_m:+.2} m from their stated positions at one end, and {last_m:+.2} m at \
+            "By the levels within a span, the distances of the sleepers are {distance_ratio:.4} (± {ratio_deviation:.4}) \
+             times the stated ones in all passes: the sleepers lie {first_m:+.2} m from their stated positions at one end, and {last_m:+.2} m at \
              the other, and the estimates belong to places between sleepers. Correct the wheel circumference of the \
              odometer, or the stated positions."
         )
@@ -143,15 +145,17 @@ impl SleeperPattern {
         let of = |scale: f64| Self::in_phase(&turned(scale), spacing_m);
         let found = of(scale);
         // A straight line through phases of equal scatter.
-        let deviation = found.deviation_m / spacing_m * 12f64.sqrt() / length;
+        let deviation = |it: &Self| it.deviation_m / spacing_m * 12f64.sqrt() / length;
         let without = of(0.0);
-        let is_known = scale.abs() > (2.0 * ENDS_MIN / length).max(DEVIATIONS_MIN * deviation)
+        let is_known = scale.abs()
+            > (2.0 * ENDS_MIN / length).max(DEVIATIONS_MIN * deviation(&found))
             && found.contrast > CONTRAST_RATIO_MIN * without.contrast;
-        let half_length_m = 0.5 * (length - 1.0) * spacing_m;
-        if is_known {
-            Self { distance_ratio: 1.0 + scale, half_length_m, ..found }
-        } else {
-            Self { half_length_m, ..without }
+        let (kept, scale) = if is_known { (found, scale) } else { (without, 0.0) };
+        Self {
+            distance_ratio: 1.0 + scale,
+            ratio_deviation: deviation(&kept),
+            half_length_m: 0.5 * (length - 1.0) * spacing_m,
+            ..kept
         }
     }
 
@@ -168,6 +172,7 @@ impl SleeperPattern {
         Self {
             shift_m: -mean.arg() * per_radian_m,
             distance_ratio: 1.0,
+            ratio_deviation: 0.0,
             half_length_m: 0.0,
             deviation_m: variance(|it| it.im).sqrt() / mean.norm() * per_radian_m,
             contrast: mean.norm() / variance(|it| it.re).max(variance(|it| it.im)).sqrt(),
@@ -262,7 +267,7 @@ impl Forward {
         let transfer = self.transfer(values, &[], false).ok()?;
         let excitation = self.excitation(&transfer, values);
         let spacing_m = self.section.track.design.sleeper.spacing_m;
-        let spans = self.section.sleepers - 1;
+        let spans = self.section.sleepers() - 1;
         let of = |speed: usize, band: usize| {
             let power = |node: usize| {
                 let lines = self.bands.weights(band).iter();

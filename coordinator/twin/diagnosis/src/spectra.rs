@@ -54,33 +54,32 @@ pub struct SpeedSpectra {
 impl Spectra {
     /// Computes the powers of all passes over all sleepers, except the passes with these indices.
     pub fn new(recording: &Recording, bands: &Bands, except: &[usize]) -> Self {
-        let powers: Vec<_> = (0..recording.passes.len())
-            .into_par_iter()
-            .filter(|pass| !except.contains(pass))
-            .map(|pass| (pass, pass_powers(recording, pass, bands)))
-            .collect();
-        let mut speeds: Vec<SpeedSpectra> = Vec::new();
-        for (pass, log_power) in powers {
-            let speed_km_h = recording.passes[pass].speed_km_h;
-            let noise_density = noise_density(&recording.passes[pass].signal, recording.spacing_m);
-            let known = speeds.iter_mut().find(|known| are_one_speed(speed_km_h, known.speed_km_h));
-            match known {
-                Some(known) => {
-                    known.passes.push(pass);
-                    known.log_power.push(log_power);
-                    known.noise_density = known.noise_density.min(noise_density);
-                }
-                None => speeds.push(SpeedSpectra {
-                    speed_km_h,
-                    passes: vec![pass],
-                    log_power: vec![log_power],
-                    noise_density,
-                }),
-            }
-        }
+        let noise_density =
+            |&pass: &usize| noise_density(&recording.passes[pass].signal, recording.spacing_m);
+        let of_speed = |passes: Vec<usize>| SpeedSpectra {
+            speed_km_h: recording.passes[passes[0]].speed_km_h,
+            log_power: passes.par_iter().map(|&it| pass_powers(recording, it, bands)).collect(),
+            noise_density: passes.iter().map(noise_density).fold(f64::INFINITY, f64::min),
+            passes,
+        };
+        let speeds = passes_by_speed(recording, except).into_par_iter().map(of_speed);
+        let mut speeds: Vec<SpeedSpectra> = speeds.collect();
         speeds.sort_by(|a, b| a.speed_km_h.total_cmp(&b.speed_km_h));
         Self { speeds }
     }
+}
+
+/// Indices of the passes at each speed, without those with the indices `except`.
+pub(crate) fn passes_by_speed(recording: &Recording, except: &[usize]) -> Vec<Vec<usize>> {
+    let mut speeds: Vec<Vec<usize>> = Vec::new();
+    let speed = |pass: usize| recording.passes[pass].speed_km_h;
+    for pass in (0..recording.passes.len()).filter(|pass| !except.contains(pass)) {
+        match speeds.iter_mut().find(|known| are_one_speed(speed(pass), speed(known[0]))) {
+            Some(known) => known.push(pass),
+            None => speeds.push(vec![pass]),
+        }
+    }
+    speeds
 }
 
 /// Whether two speeds in km/h count as one speed.

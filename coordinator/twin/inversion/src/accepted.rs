@@ -64,7 +64,9 @@ impl Inversion {
                 Parameter::ALL.iter().filter_map(|it| Some((*it, found(it)?))).collect();
             for (parameter, Estimate { mean, sd }) in replaced {
                 sleeper.estimates.insert(parameter, tracktwin_evaluation::Estimate { mean, sd });
-                sleeper.flags.push(Flag::UnlikeNeighbours);
+                if !sleeper.flags.contains(&Flag::UnlikeNeighbours) {
+                    sleeper.flags.push(Flag::UnlikeNeighbours);
+                }
             }
         }
     }
@@ -113,7 +115,7 @@ fn placed(
     let section = &prepared.forward.section;
     if kind.place != PlaceKind::Sleepers {
         let reach_m = REACH * section.track.design.sleeper.spacing_m;
-        let ends = [section.x_m(0) - reach_m, section.x_m(section.sleepers - 1) + reach_m];
+        let ends = [section.x_m(0) - reach_m, section.x_m(section.sleepers() - 1) + reach_m];
         let is_inside = location.x_m[0] <= ends[1] && location.x_m[1] >= ends[0];
         let middle_m = 0.5 * (location.x_m[0] + location.x_m[1]);
         let x_m = if kind.place == PlaceKind::Point { [middle_m; 2] } else { location.x_m };
@@ -122,7 +124,7 @@ fn placed(
     if is_everywhere {
         return Some(extension);
     }
-    let compared = recording.sleepers.iter().skip(prepared.first_sleeper).take(section.sleepers);
+    let compared = recording.sleepers.iter().skip(prepared.first_sleeper).take(section.sleepers());
     let is_there = |(index, id): (usize, &String)| location.sleepers.contains(id).then_some(index);
     let sleepers: Vec<usize> =
         compared.map(|sleeper| &sleeper.id).enumerate().filter_map(is_there).collect();

@@ -91,7 +91,7 @@ pub fn fit(
             .ok_or(CalibrationError::NotFinite)?;
     let mut forward = prepared.forward.clone();
     forward.unknowns = unknowns_of(&forward);
-    let mut factors = vec![1.0; forward.section.sleepers];
+    let mut factors = vec![1.0; forward.section.sleepers()];
     let fit = |forward: &_, factors: &[f64], start| {
         let observation = &plain.clone().with_factors(factors);
         Problem { forward, observation, candidates: known }.calibrate(start)
@@ -115,9 +115,8 @@ pub fn fit(
         start.rows_mut(0, best.len()).copy_from(&best);
         calibration = fit(&forward, &factors, start)?;
     }
-    let observation = &plain.clone().with_factors(&factors);
-    let problem = Problem { forward: &prepared.forward, observation, candidates: known };
-    add_soft_sleepers(&problem, &mut forward, &mut calibration)?;
+    let observation = plain.clone().with_factors(&factors);
+    add_soft_sleepers(&observation, known, &mut forward, &mut calibration)?;
     let valley =
         along_valley(|forward, start| fit(forward, &factors, start), &forward, &calibration)?;
     let posterior = Posterior::mixture(&valley);

@@ -6,7 +6,8 @@
 use nalgebra::DVector;
 use rayon::prelude::*;
 use tracktwin_diagnosis::{
-    Calibration, CalibrationError, EXCEPTION_NATS, Exception, Forward, Own, Problem,
+    Calibration, CalibrationError, Candidate, EXCEPTION_NATS, Exception, Forward, Observation, Own,
+    Problem,
 };
 
 /// Natural logarithm of the tried share of a stiffness.
@@ -22,21 +23,22 @@ const NEIGHBOURS: usize = 4;
 /// Loss of log likelihood in nats up to which a trial is fitted; all other values are those of the fit without it.
 const LOSS_MAX: f64 = 10.0;
 
-/// Adds exceptions for soft sleepers to the unknowns while they raise the log evidence enough. `forward` and the
-/// calibration of `problem` are replaced.
+/// Adds exceptions for soft sleepers to the unknowns of `forward` while they raise the log evidence of its `calibration`
+/// enough. `known` physics is part of the model.
 ///
 /// # Errors
 /// [`CalibrationError`] if no track model exists for the fitted values.
 pub(crate) fn add_soft_sleepers(
-    problem: &Problem<'_>,
+    observation: &Observation,
+    known: &[Candidate],
     forward: &mut Forward,
     calibration: &mut Calibration,
 ) -> Result<(), CalibrationError> {
     for _ in 0..FOUND_MAX {
-        let at = Problem { forward, ..*problem };
-        let tried: Vec<_> = promising(&at, calibration)?
+        let problem = Problem { forward, observation, candidates: known };
+        let tried: Vec<_> = promising(&problem, calibration)?
             .into_par_iter()
-            .filter_map(|exception| fitted_with(&at, exception, calibration))
+            .filter_map(|exception| fitted_with(&problem, exception, calibration))
             .collect();
         let better = |(_, one): &(Forward, Calibration), (_, other): &(Forward, Calibration)| {
             one.log_evidence.total_cmp(&other.log_evidence)
@@ -66,7 +68,7 @@ fn promising(
     let unknowns = &forward.unknowns;
     let fields = [Own::BallastStiffness, Own::RailpadStiffness];
     let all = fields.into_iter().flat_map(|field| {
-        (0..forward.section.sleepers).map(move |sleeper| Exception { field, sleeper })
+        (0..forward.section.sleepers()).map(move |sleeper| Exception { field, sleeper })
     });
     let new: Vec<Exception> = all.filter(|it| !unknowns.exceptions.contains(it)).collect();
     let loss = |&exception: &Exception| {
@@ -88,7 +90,7 @@ fn with_little(
 ) -> DVector<f64> {
     let unknowns = &problem.forward.unknowns;
     let near = |reach: usize| {
-        let last = problem.forward.section.sleepers - 1;
+        let last = problem.forward.section.sleepers() - 1;
         sleeper.saturating_sub(reach)..=(sleeper + reach).min(last)
     };
     let beside = near(NEIGHBOURS).filter(|other| !near(1).contains(other));
@@ -118,7 +120,7 @@ fn fitted_with(
 mod tests {
     use super::*;
     use nalgebra::DMatrix;
-    use tracktwin_diagnosis::{Bands, Observation, Section, Variation};
+    use tracktwin_diagnosis::{Bands, Section, Variation};
     use tracktwin_parameters::TrackDesign;
 
     const SLEEPERS: usize = 12;
@@ -137,10 +139,9 @@ mod tests {
         let log_power = forward.log_power(&truth, &[]).unwrap();
         let covariance = DMatrix::identity(forward.per_sleeper(), forward.per_sleeper()) * 0.02;
         let observation = Observation::new(log_power, &covariance, |_| false).unwrap();
-        let start = forward.clone();
-        let problem = Problem { forward: &start, observation: &observation, candidates: &[] };
-        let mut calibration = problem.calibrate(start.unknowns.typical()).unwrap();
-        add_soft_sleepers(&problem, &mut forward, &mut calibration).unwrap();
+        let problem = Problem { forward: &forward, observation: &observation, candidates: &[] };
+        let mut calibration = problem.calibrate(forward.unknowns.typical()).unwrap();
+        add_soft_sleepers(&observation, &[], &mut forward, &mut calibration).unwrap();
         (forward.unknowns.exceptions, (calibration.values[ballast] - truth[ballast]).exp())
     }
 

@@ -41,7 +41,7 @@ impl Fitted {
         let mut unknowns = unknowns_of(&prepared.forward);
         let (values, rest) = numbers.split_at_checked(unknowns.count())?;
         let (deviations, rest) = rest.split_at_checked(unknowns.count())?;
-        let (misfit, rest) = rest.split_at_checked(prepared.forward.section.sleepers)?;
+        let (misfit, rest) = rest.split_at_checked(prepared.forward.section.sleepers())?;
         let (variation, rest) = rest.split_at_checked(3 * unknowns.variation.len())?;
         for (of, numbers) in unknowns.variation.iter_mut().zip(variation.chunks_exact(3)) {
             *of = Variation { smooth: numbers[0], length: numbers[1], independent: numbers[2] };
@@ -103,7 +103,7 @@ mod tests {
             changes: [0.3, -0.4]
                 .map(|log| Amplitude { log, deviation: 0.1, probability: 0.9 })
                 .to_vec(),
-            misfit: vec![0.9; section.forward.section.sleepers],
+            misfit: vec![0.9; section.forward.section.sleepers()],
             unknowns,
         };
         let numbers = fitted.numbers();

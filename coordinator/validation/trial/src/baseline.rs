@@ -19,7 +19,8 @@ pub struct Bias {
     pub after: f64,
 }
 
-/// Errors at the sleepers next to hidden effects; the truth of a missing railpad is what is left of it. All sleepers count if an effect acts everywhere.
+/// Errors at the sleepers next to hidden effects; the truth of a missing railpad is what is left of it. All sleepers
+/// count if an effect acts everywhere.
 pub(crate) fn bias(scene: &Scene, diagnosis: &Diagnosis) -> Option<Bias> {
     if scene.left_out.iter().all(is_artefact) {
         return None;

@@ -48,7 +48,7 @@ fn in_recording(
         extension = extension.with("bending_length_m", crack_m);
     }
     let compared: Vec<Option<usize>> =
-        (0..prepared.forward.section.sleepers).map(|s| number(recording, prepared, s)).collect();
+        (0..prepared.forward.section.sleepers()).map(|s| number(recording, prepared, s)).collect();
     if let Some(sleepers) = &mut extension.sleepers {
         let place = |number: &usize| compared.iter().position(|other| *other == Some(*number));
         *sleepers = sleepers.iter().filter_map(place).collect();
@@ -85,7 +85,7 @@ fn values(
     let mut levels: Vec<f64> = unknowns.level().map(|index| fitted[index]).collect();
     levels.sort_by(f64::total_cmp);
     let level = levels[levels.len() / 2];
-    for sleeper in 0..prepared.forward.section.sleepers {
+    for sleeper in 0..prepared.forward.section.sleepers() {
         let truth = number(recording, prepared, sleeper).and_then(|n| scene.sleepers.get(n));
         let Some(truth) = truth else { continue };
         values[unknowns.ballast().start + sleeper] = truth.ballast_stiffness_n_m.ln();

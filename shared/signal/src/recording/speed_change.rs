@@ -7,8 +7,13 @@ use tracktwin_number::rounded;
 const CHANGE_MAX: f64 = 0.05;
 
 impl Pass {
-    /// Mean speeds in m/s in the first and in the second half of the time, from the positions.
-    pub fn half_speeds_m_s(&self) -> [f64; 2] {
+    /// Difference of the mean speeds in the two halves of the time, as a share of their mean, from the positions.
+    pub fn speed_change(&self) -> f64 {
+        let [first, second] = self.half_speeds_m_s();
+        2.0 * (second - first).abs() / (second + first).abs()
+    }
+
+    fn half_speeds_m_s(&self) -> [f64; 2] {
         let half = self.position_m.len() / 2;
         let seconds = (half - 1).max(1) as f64 / self.signal.sample_rate_hz();
         let way_m = |from: usize| self.position_m[from + half - 1] - self.position_m[from];
@@ -18,16 +23,12 @@ impl Pass {
 
 /// Doubt about a pass whose speed changes much.
 pub(super) fn doubt(pass: &Pass) -> Option<String> {
-    let [first, second] = pass.half_speeds_m_s();
-    let change = 2.0 * (second - first).abs() / (second + first);
-    let km_h = |m_s: f64| rounded(3.6 * m_s, 3);
-    (change > CHANGE_MAX).then(|| {
+    let [first, second] = pass.half_speeds_m_s().map(|m_s| rounded(3.6 * m_s, 3));
+    (pass.speed_change() > CHANGE_MAX).then(|| {
         format!(
-            "doubt: {}: the mean speed is {} km/h in the first half and {} km/h in the second, and the levels are compared \
-             with those at the mean speed of the pass; record at a steady speed",
-            pass.file,
-            km_h(first),
-            km_h(second)
+            "doubt: {}: the mean speed is {first} km/h in the first half and {second} km/h in the second, and the levels \
+             are compared with those at the mean speed of the pass; record at a steady speed",
+            pass.file
         )
     })
 }

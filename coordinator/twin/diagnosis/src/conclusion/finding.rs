@@ -52,7 +52,7 @@ impl Evidence<'_> {
         if share_with_fitted(shown, is_fitted, self.probability_max(), all) {
             return;
         }
-        let sleepers = self.prepared.forward.section.sleepers;
+        let sleepers = self.prepared.forward.section.sleepers();
         let explained = !kind.measuring_chain
             && all.iter().any(|known| {
                 explains(known, kind, location.as_ref(), reach_m)

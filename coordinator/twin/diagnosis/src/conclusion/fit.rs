@@ -35,7 +35,7 @@ impl Evidence<'_> {
                 let row = sleeper * forward.per_sleeper() + speed * bands;
                 values.rows(row, bands).iter().map(|value| DECIBEL * value).collect()
             };
-            let sleepers = |speed| (0..forward.section.sleepers).map(|s| of(speed, s)).collect();
+            let sleepers = |speed| (0..forward.section.sleepers()).map(|s| of(speed, s)).collect();
             (0..forward.speeds_m_s.len()).map(sleepers).collect()
         };
         let scatter = |speed: usize| {
@@ -110,7 +110,7 @@ impl Evidence<'_> {
                 place.x_m[0] - half_m <= x_m && x_m <= place.x_m[1] + half_m
             })
         };
-        let near: Vec<usize> = (0..section.sleepers).filter(at_place).collect();
+        let near: Vec<usize> = (0..section.sleepers()).filter(at_place).collect();
         if near.is_empty() {
             return BTreeMap::new();
         }
@@ -175,7 +175,7 @@ impl Evidence<'_> {
             let after = self.replaced_railpad(hypotheses, sleeper).unwrap_or(fitted.after);
             BeforeAfter { after, ..fitted }
         };
-        (0..self.prepared.forward.section.sleepers)
+        (0..self.prepared.forward.section.sleepers())
             .map(|sleeper| SleeperValues {
                 id: self.id(sleeper),
                 x_m: self.prepared.forward.section.x_m(sleeper),

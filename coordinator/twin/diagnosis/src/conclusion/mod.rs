@@ -99,7 +99,7 @@ impl Evidence<'_> {
         let levels = self.levels()?;
         let fit = self.fit(&hypotheses);
         let bias_removed = self.bias_removed(&hypotheses);
-        let count = self.prepared.forward.section.sleepers;
+        let count = self.prepared.forward.section.sleepers();
         let sleepers: Vec<String> = (0..count).map(|sleeper| self.id(sleeper)).collect();
         let said = sentence(verdict, &hypotheses, nothing_left_out, &sleepers, &fit, &bias_removed);
         let support_changes = self.support_changes(verdict);
@@ -107,10 +107,8 @@ impl Evidence<'_> {
         let track = self.track(&hypotheses);
         let unlike = unlike_neighbours(&track, verdict, &hypotheses);
         let doubts: Vec<String> = unlike.into_iter().chain(self.misplaced()).collect();
-        let sentence = said
-            + &further(&support_changes, loss_of_contact.as_ref())
-            + &doubts.concat()
-            + &self.much_lost();
+        let further = further(&support_changes, loss_of_contact.as_ref());
+        let sentence = [said, further, doubts.concat(), self.much_lost()].concat();
         let mut notes = self.notes(&hypotheses);
         notes.extend(doubts.iter().map(|doubt| doubt.trim_start().to_owned()));
         Ok(Diagnosis {

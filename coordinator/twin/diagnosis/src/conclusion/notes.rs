@@ -43,7 +43,7 @@ impl Evidence<'_> {
 
     /// Sentence on the sleepers that are not covered at every speed.
     pub(super) fn lost(&self) -> String {
-        let last = self.prepared.forward.section.sleepers - 1;
+        let last = self.prepared.forward.section.sleepers() - 1;
         self.prepared.uncovered.lost(&self.id(0), &self.id(last))
     }
 

@@ -23,13 +23,13 @@ impl Evidence<'_> {
             (PlaceKind::Nowhere, _, _) => None,
             (_, Some([from_m, to_m]), _) => Some(self.location_between(from_m, to_m)),
             (_, None, Some(sleepers)) => (!sleepers.is_empty()).then(|| self.location(sleepers)),
-            (_, None, None) => Some(self.location(&(0..section.sleepers).collect::<Vec<_>>())),
+            (_, None, None) => Some(self.location(&(0..section.sleepers()).collect::<Vec<_>>())),
         }
     }
 
     /// `None` at the wheel or if the stiffness is everywhere.
     pub(super) fn location_of_port(&self, place: &PortPlace) -> Option<Location> {
-        let everywhere = self.prepared.forward.section.sleepers;
+        let everywhere = self.prepared.forward.section.sleepers();
         match place {
             PortPlace::Seats(seats) if seats.len() < everywhere => Some(self.location(seats)),
             PortPlace::Between(pair) => Some(self.location(pair)),
@@ -90,7 +90,7 @@ impl Evidence<'_> {
         let forward = &self.prepared.forward;
         let square = |row: usize| change[row].powi(2);
         let (mut by_sleeper, mut by_band) =
-            (vec![0.0; forward.section.sleepers], vec![0.0; forward.bands.count()]);
+            (vec![0.0; forward.section.sleepers()], vec![0.0; forward.bands.count()]);
         for row in 0..forward.count() {
             let (sleeper, _, band) = forward.place(row);
             by_sleeper[sleeper] += square(row);

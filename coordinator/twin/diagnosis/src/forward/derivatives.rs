@@ -135,7 +135,7 @@ impl Forward {
             })
         };
         let seats = (0..self.section.spans() - 1).into_par_iter().map(seat).collect();
-        let between = (1..self.section.sleepers).into_par_iter().map(between).collect();
+        let between = (1..self.section.sleepers()).into_par_iter().map(between).collect();
         let wheel = self.columns(&shares, &excitation, shapes, |_, window, line| {
             Some(transfer.sensitivity_at_wheel(window, line))
         });

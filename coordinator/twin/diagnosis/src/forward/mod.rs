@@ -72,7 +72,7 @@ impl Forward {
         let surface =
             speeds_m_s.iter().map(|&v| lines.iter().map(|&hz| density(v, hz)).collect()).collect();
         let wheel_turns = WheelTurns::default();
-        let rows = section.sleepers * speeds_m_s.len() * bands.count();
+        let rows = section.sleepers() * speeds_m_s.len() * bands.count();
         let beyond = DMatrix::zeros(rows, unknowns.beyond().len());
         Self {
             section,
@@ -97,7 +97,7 @@ impl Forward {
 
     /// Number of log powers.
     pub fn count(&self) -> usize {
-        self.section.sleepers * self.per_sleeper()
+        self.section.sleepers() * self.per_sleeper()
     }
 
     /// Number of log powers per sleeper.
@@ -119,7 +119,7 @@ impl Forward {
 
     /// Log powers from a transfer.
     pub(crate) fn levels(&self, transfer: &Transfer, values: &DVector<f64>) -> DVector<f64> {
-        self.levels_at(transfer, values, 0..self.section.sleepers)
+        self.levels_at(transfer, values, 0..self.section.sleepers())
     }
 
     /// Log powers from a transfer at a range of sleepers.
@@ -230,7 +230,7 @@ impl Forward {
     /// stretch is in spacings from the first compared sleeper.
     pub(crate) fn felt_at(&self, [from, to]: [f64; 2]) -> Range<usize> {
         let reach = NEIGHBOURS as f64 + self.section.furthest_wheel();
-        let count = self.section.sleepers;
+        let count = self.section.sleepers();
         let first = (from - reach).floor().max(0.0) as usize;
         let end = ((to + reach).ceil().max(0.0) as usize + 1).min(count);
         first.min(end)..end

@@ -67,9 +67,9 @@ impl FromSleeper {
         let section = &forward.section;
         let is_near =
             |&compared: &usize| section.in_track(compared).abs_diff(in_track) <= NEIGHBOURS;
-        let first = (0..section.sleepers).find(is_near).unwrap_or(section.sleepers);
+        let first = (0..section.sleepers()).find(is_near).unwrap_or(section.sleepers());
         let near =
-            first..(first..section.sleepers).take_while(is_near).last().map_or(first, |c| c + 1);
+            first..(first..section.sleepers()).take_while(is_near).last().map_or(first, |c| c + 1);
         if near.is_empty() {
             return Self { near, changes: Vec::new() };
         }

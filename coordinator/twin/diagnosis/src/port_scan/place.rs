@@ -51,7 +51,7 @@ impl PortPlace {
 /// Groups of sleepers that may have the same unknown stiffness: indices of the compared ones, and indices
 /// in the whole track. A periodic group ends at the compared sleepers, or continues beyond them.
 pub(super) fn seats_together(section: &Section) -> Vec<(Vec<usize>, Vec<usize>)> {
-    let count = section.sleepers;
+    let count = section.sleepers();
     let single = (0..count).map(|sleeper| vec![sleeper]);
     let pairs = (1..count).map(|sleeper| vec![sleeper - 1, sleeper]);
     // A pattern is one where it comes back twice.

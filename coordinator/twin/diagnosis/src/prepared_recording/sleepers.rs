@@ -1,7 +1,7 @@
 //! Selection of the compared sleepers, and their division into sections.
 
 use super::{MARGIN_SPANS, PreparationError, SLEEPERS_MIN};
-use crate::spectra::are_one_speed;
+use crate::spectra::passes_by_speed;
 use std::ops::Range;
 use tracktwin_signal::recording::Recording;
 
@@ -50,14 +50,7 @@ struct BySpeed<'r> {
 impl<'r> BySpeed<'r> {
     /// The passes except those with the indices `except`.
     fn new(recording: &'r Recording, except: &[usize]) -> Self {
-        let mut speeds: Vec<Vec<usize>> = Vec::new();
-        let speed = |pass: usize| recording.passes[pass].speed_km_h;
-        for pass in (0..recording.passes.len()).filter(|pass| !except.contains(pass)) {
-            match speeds.iter_mut().find(|known| are_one_speed(speed(pass), speed(known[0]))) {
-                Some(known) => known.push(pass),
-                None => speeds.push(vec![pass]),
-            }
-        }
+        let speeds = passes_by_speed(recording, except);
         Self { recording, speeds }
     }
 

@@ -44,7 +44,7 @@ impl Extent {
     }
 
     fn everywhere(section: &Section) -> Self {
-        Self { from: 0.0, to: (section.sleepers - 1) as f64 }
+        Self { from: 0.0, to: (section.sleepers() - 1) as f64 }
     }
 
     /// The extent including its reach on either side.

@@ -46,7 +46,7 @@ impl Setting<'_> {
     ) -> Option<Visible> {
         let patch = scan.best(&current.residual, &current.gradient, &is_one)?;
         let nulls = whitened(&self.nulls, observation, current);
-        let excess = excess(current, &nulls, self.prepared.forward.section.sleepers);
+        let excess = excess(current, &nulls, self.prepared.forward.section.sleepers());
         let p_value = tail_probability(
             &nulls,
             patch.deviations / excess.sqrt(),

@@ -188,7 +188,7 @@ impl<'a> Setting<'a> {
     ) -> Round {
         let highest = screened.iter().map(|(evidence, _)| *evidence).fold(f64::MIN, f64::max);
         let nulls = whitened(&self.nulls, problem.observation, current);
-        let excess = excess(current, &nulls, self.prepared.forward.section.sleepers);
+        let excess = excess(current, &nulls, self.prepared.forward.section.sleepers());
         let p_value = tail_probability(&nulls, highest / excess, |residual, projected_gradient| {
             let evidence =
                 screened.iter().map(|(_, t)| t.log_evidence(residual, projected_gradient));

@@ -42,7 +42,7 @@ impl SearchOutcome {
         // What is left without a name explains as well.
         let left = self.rounds.last().filter(|last| !last.accepted).map_or(0.0, Round::most);
         let together = self.last.log_evidence - self.observation.log_deviation() + left;
-        let sleepers = forward.section.sleepers;
+        let sleepers = forward.section.sleepers();
         let mut gains = squares(&self.last.residual, sleepers);
         for (alone, _) in &each {
             let left = squares(&alone.residual, sleepers);

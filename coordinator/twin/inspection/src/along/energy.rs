@@ -43,11 +43,6 @@ pub const SPEED_RATIO: f64 = 1.2;
 /// per cent.
 const ROUNDING: f64 = 0.99;
 
-/// Mean speed of a pass in m/s, from its positions.
-pub(crate) fn speed_m_s(pass: &Pass) -> f64 {
-    pass.mean_speed_m_s()
-}
-
 /// Indices of the passes at each speed, the fastest speed first.
 ///
 /// Nominal speeds within 2 % count as equal, because a drive holds its speed no more closely.

@@ -13,7 +13,7 @@ pub(crate) mod testing;
 
 pub use background::median;
 pub(crate) use background::{Background, hann, whitened};
-pub(crate) use energy::{Energy, by_speed, speed_m_s};
+pub(crate) use energy::{Energy, by_speed};
 pub use energy::{SPEED_RATIO, separate_wavelengths};
 pub(crate) use innovation::Innovations;
 pub(crate) use line::{LOBE, Line, Ruler, Spectrum, amplitude, index_at, on_even_places};

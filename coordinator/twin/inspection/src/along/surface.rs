@@ -6,7 +6,7 @@
 //! track has one. `S` is eq. B.6 of the usual level, times a factor whose logarithm is a parabola over the
 //! logarithm of the wave number.
 
-use super::{Background, speed_m_s};
+use super::Background;
 use nalgebra::{Matrix3, Vector3};
 use num_complex::Complex64;
 use std::f64::consts::{LN_2, TAU};
@@ -86,7 +86,7 @@ impl Surface {
         let patch = track.design.contact_patch_filter.then(|| ContactPatch::new(&track.design));
         let of_pass = |pass: &Pass| {
             let background = Background::of(&pass.signal)?;
-            let (speed, audible_hz) = (speed_m_s(pass), background.audible_hz(AUDIBLE));
+            let (speed, audible_hz) = (pass.mean_speed_m_s(), background.audible_hz(AUDIBLE));
             let value = |(hz, power): (f64, f64)| {
                 let wave_number = hz / speed;
                 let gain = patch.map_or(1.0, |patch| patch.gain(TAU * wave_number));

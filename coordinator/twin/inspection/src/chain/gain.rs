@@ -1,8 +1,6 @@
 //! Gain errors: passes at one speed that differ by a constant factor.
 
-use crate::along::{
-    Background, Energy, bonferroni, by_speed, ln_student_tail, median, speed_m_s, whitened,
-};
+use crate::along::{Background, Energy, bonferroni, by_speed, ln_student_tail, median, whitened};
 use tracktwin_signal::recording::{Pass, Recording};
 
 /// Bands in Hz whose powers are compared; a gain error is the same in all bands.
@@ -132,7 +130,7 @@ impl Levels {
         let last = |pass: &&Pass| pass.position_m[pass.position_m.len() - 1];
         let to = passes.iter().map(last).fold(f64::MAX, f64::min);
         let of = |pass: &&Pass| levels(pass, &background, [from, to], recording.spacing_m);
-        let speeds_m_s = passes.iter().map(|pass| speed_m_s(pass)).collect();
+        let speeds_m_s = passes.iter().map(|pass| pass.mean_speed_m_s()).collect();
         Some(Self { levels: passes.iter().map(of).collect(), speeds_m_s })
     }
 

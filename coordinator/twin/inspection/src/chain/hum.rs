@@ -3,9 +3,7 @@
 //! Two passes of one speed share the surface and the track but not the phase of the mains. So a line is searched in
 //! their difference, too, where less is beside it.
 
-use crate::along::{
-    LOBE, Line, Spectrum, bonferroni, by_speed, index_at, ln_gamma_tail, speed_m_s,
-};
+use crate::along::{LOBE, Line, Spectrum, bonferroni, by_speed, index_at, ln_gamma_tail};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use tracktwin_signal::Signal;
@@ -338,7 +336,7 @@ impl PassSpectra {
         Self {
             spectra: samples.chunks_exact(length).map(spectrum).collect(),
             duration_s: length as f64 / rate_hz,
-            speed_m_s: speed_m_s(pass),
+            speed_m_s: pass.mean_speed_m_s(),
             rate_hz,
         }
     }

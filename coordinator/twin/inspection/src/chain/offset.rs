@@ -1,8 +1,7 @@
 //! Offset between the odometers of two passes, from their common surface.
 
 use crate::along::{
-    Background, Ruler, bonferroni, by_speed, ln_normal_bound, median, on_even_places, speed_m_s,
-    whitened,
+    Background, Ruler, bonferroni, by_speed, ln_normal_bound, median, on_even_places, whitened,
 };
 use num_complex::Complex64;
 use std::f64::consts::LN_2;
@@ -115,9 +114,9 @@ fn compare(recording: &Recording, passes: [usize; 2]) -> Option<Offsets> {
     let last = |pass: &Pass| pass.position_m[pass.position_m.len() - 1];
     let to = last(first).min(last(second));
     let shortest_m = SHORTEST * recording.spacing_m;
-    let high = (speed_m_s(first) / shortest_m).min(HIGH_SHARE * recording.sample_rate_hz);
+    let high = (first.mean_speed_m_s() / shortest_m).min(HIGH_SHARE * recording.sample_rate_hz);
     let low = (LOW_M_S / recording.spacing_m).min(0.25 * high);
-    let step = speed_m_s(first) / high / POINTS;
+    let step = first.mean_speed_m_s() / high / POINTS;
     let points = ((to - from) / step) as usize;
     let values = |pass: &Pass| -> Option<Vec<Complex64>> {
         let white = whitened(&pass.signal, &Background::of(&pass.signal)?, [low, high]);
@@ -132,7 +131,7 @@ fn compare(recording: &Recording, passes: [usize; 2]) -> Option<Offsets> {
         return None;
     }
     // Independent values of a stretch: bandwidth times duration.
-    let freedom = (high - low) * length as f64 * step / speed_m_s(first);
+    let freedom = (high - low) * length as f64 * step / first.mean_speed_m_s();
     let mut all = Offsets {
         passes,
         matched: Vec::new(),

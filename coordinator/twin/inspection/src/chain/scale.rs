@@ -1,6 +1,6 @@
 //! Scale errors: positions that deviate from the stated speeds by the same factor at every speed.
 
-use crate::along::{by_speed, ln_normal_bound, speed_m_s};
+use crate::along::{by_speed, ln_normal_bound};
 use crate::median;
 use tracktwin_signal::recording::{Pass, Recording};
 
@@ -45,7 +45,8 @@ pub fn scale(recording: &Recording) -> Option<Scale> {
     };
     let shortest = (0..passes.len()).map(length).fold(f64::INFINITY, f64::min);
     let deviation = WANDER * recording.spacing_m / shortest;
-    let of_pass = |&index: &usize| 3.6 * speed_m_s(&passes[index]) / passes[index].speed_km_h - 1.0;
+    let of_pass =
+        |&index: &usize| 3.6 * passes[index].mean_speed_m_s() / passes[index].speed_km_h - 1.0;
     let of_speed = |group: &Vec<usize>| group.iter().map(of_pass).sum::<f64>() / group.len() as f64;
     let each: Vec<f64> = groups.iter().map(of_speed).collect();
     let count = each.len() as f64;
@@ -54,13 +55,7 @@ pub fn scale(recording: &Recording) -> Option<Scale> {
         return None;
     }
     let deviation = deviation / count.sqrt();
-    let usual = USUAL_MIN.max(DRIFTS * median(passes.iter().map(drift).collect()));
+    let usual = USUAL_MIN.max(DRIFTS * median(passes.iter().map(Pass::speed_change).collect()));
     let ln_p = ln_normal_bound((mean.abs() - usual) / deviation);
     Some(Scale { scale: (mean, deviation), usual, speeds: each.len(), ln_p })
-}
-
-/// Relative difference of the mean speeds in the two halves of a pass.
-fn drift(pass: &Pass) -> f64 {
-    let [first, second] = pass.half_speeds_m_s();
-    2.0 * (second - first).abs() / (second + first).abs()
 }

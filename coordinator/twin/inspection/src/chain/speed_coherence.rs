@@ -1,6 +1,6 @@
 //! Coherence between the passes at one speed and those at other speeds.
 
-use crate::along::{Background, Ruler, by_speed, hann, on_even_places, speed_m_s, whitened};
+use crate::along::{Background, Ruler, by_speed, hann, on_even_places, whitened};
 use num_complex::Complex64;
 use tracktwin_signal::recording::{Pass, Recording};
 
@@ -61,7 +61,8 @@ fn segments(recording: &Recording) -> Option<Vec<Segments>> {
     let stretch_m = [from_m, from_m + points as f64 * step_m];
     passes()
         .map(|pass| {
-            let band = WAVES.map(|waves| waves as f64 * speed_m_s(pass) / recording.spacing_m);
+            let band =
+                WAVES.map(|waves| waves as f64 * pass.mean_speed_m_s() / recording.spacing_m);
             let white = whitened(&pass.signal, &Background::of(&pass.signal)?, band);
             let values = on_even_places(pass, &white, stretch_m, points, Ruler::Odometer);
             Some(lines(&values, length))

@@ -2,7 +2,7 @@
 
 use crate::along::{
     Background, Line, Ruler, Spectrum, Surface, amplitude, bonferroni, by_speed,
-    combine_dependent_p_values, median, on_even_places, separate_wavelengths, speed_m_s, whitened,
+    combine_dependent_p_values, median, on_even_places, separate_wavelengths, whitened,
 };
 use num_complex::Complex64;
 use tracktwin_signal::recording::{Pass, Recording};
@@ -97,7 +97,7 @@ pub fn corrugation(
 /// The whitened pass with limited magnitude, and its usable wave numbers `[lowest, highest]` in cycles/m.
 fn held(pass: &Pass, [low, high]: [f64; 2]) -> Option<(Vec<Complex64>, [f64; 2])> {
     let background = Background::of(&pass.signal)?;
-    let speed = speed_m_s(pass);
+    let speed = pass.mean_speed_m_s();
     let audible = background.audible_hz(AUDIBLE);
     let top = (high * speed).min(HIGH_SHARE * pass.signal.sample_rate_hz()).min(audible);
     let band = [(low * speed).max(LOW_HZ), top];

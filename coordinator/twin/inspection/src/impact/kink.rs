@@ -8,7 +8,7 @@
 
 use super::coherent::coherent_shape;
 use super::shape::Shape;
-use crate::along::{Innovations, Surface, bonferroni, ln_normal_bound, speed_m_s};
+use crate::along::{Innovations, Surface, bonferroni, ln_normal_bound};
 use tracktwin_number::NORMAL_QUARTILE;
 use tracktwin_signal::recording::{Pass, Recording};
 
@@ -57,7 +57,7 @@ struct Found {
 /// Kinks whose probability by chance is below `alpha`, the most significant one first.
 pub(super) fn kinks(recording: &Recording, alpha: f64) -> Vec<Kink> {
     let spacing_m = recording.spacing_m;
-    let top_hz = |pass: &Pass| WAVES_PER_SPACING * speed_m_s(pass) / spacing_m;
+    let top_hz = |pass: &Pass| WAVES_PER_SPACING * pass.mean_speed_m_s() / spacing_m;
     let passes = recording.passes.iter();
     let innovations = passes.map(|pass| Innovations::of(pass, top_hz(pass)));
     let Some(innovations) = innovations.collect::<Option<Vec<_>>>() else { return Vec::new() };

@@ -1,6 +1,6 @@
 //! Power in short cells along the track for every pass, with tail probabilities.
 
-use crate::along::{Background, Energy, by_speed, ln_ratio_tail, median, speed_m_s, whitened};
+use crate::along::{Background, Energy, by_speed, ln_ratio_tail, median, whitened};
 use std::ops::Range;
 use tracktwin_number::NORMAL_QUARTILE;
 use tracktwin_signal::recording::{Pass, Recording};
@@ -57,7 +57,7 @@ impl ImpactKind {
         spacing_m: f64,
     ) -> Option<[f64; 2]> {
         let hollow_hz = |waves: [f64; 2]| {
-            let [low, high] = waves.map(|waves| waves * speed_m_s(pass) / spacing_m);
+            let [low, high] = waves.map(|waves| waves * pass.mean_speed_m_s() / spacing_m);
             [low.max(HOLLOW_LOW_HZ), high]
         };
         let [low, high] = match self {
@@ -131,7 +131,7 @@ fn width(recording: &Recording, kind: ImpactKind) -> Option<f64> {
     let mut width = CELL_SHARE * recording.spacing_m;
     for pass in &recording.passes {
         let [low, high] = kind.band(pass, &Background::of(&pass.signal)?, recording.spacing_m)?;
-        width = width.max(PRODUCT_MIN * speed_m_s(pass) / (high - low));
+        width = width.max(PRODUCT_MIN * pass.mean_speed_m_s() / (high - low));
     }
     (width < 0.5 * recording.spacing_m).then_some(width)
 }

@@ -5,7 +5,7 @@
 //! track.
 
 use super::repeated::ImpactKind;
-use crate::along::{Background, Surface, hann, speed_m_s};
+use crate::along::{Background, Surface, hann};
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 use tracktwin_signal::recording::{Pass, Recording};
@@ -79,7 +79,7 @@ impl Observed {
         let start = blow.checked_sub(before)?;
         let segment = samples.get(start..blow + after)?;
         let (power, window_s) = spectrum(segment, before, rate);
-        let speed = speed_m_s(pass);
+        let speed = pass.mean_speed_m_s();
         let step = rate / segment.len() as f64;
         let mut bands = Vec::new();
         let mut low = LOW_HZ.min(0.25 * high);

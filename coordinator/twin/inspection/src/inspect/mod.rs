@@ -106,24 +106,21 @@ impl Inspection {
     /// Notes on the passes that are not compared with the track.
     pub fn notes_on_not_compared(&self, recording: &Recording) -> Vec<String> {
         let file = |&pass: &usize| &*recording.passes[pass].file;
-        let note = |(passes, differs): (&Vec<usize>, &str)| {
+        let note = |(passes, reason): (&Vec<usize>, &str)| {
             let files: Vec<&str> = passes.iter().map(file).collect();
             (!files.is_empty()).then(|| {
-                format!(
-                    "{}: not compared with the track, because their {differs} of another pass at the same \
-                     speed.",
-                    files.join(", ")
-                )
+                format!("{}: not compared with the track, because {reason}.", files.join(", "))
             })
         };
-        let of_position = (&self.misplaced, "positions differ from those");
-        let of_gain = (&self.of_other_gain, "gain differs from that");
-        let dropped_out: Vec<&str> = self.dropped_out.iter().map(file).collect();
-        let of_signal = (!dropped_out.is_empty()).then(|| {
-            let files = dropped_out.join(", ");
-            format!("{files}: not compared with the track, because the signal drops out.")
-        });
-        [of_position, of_gain].into_iter().filter_map(note).chain(of_signal).collect()
+        let all = [
+            (
+                &self.misplaced,
+                "their positions differ from those of another pass at the same speed",
+            ),
+            (&self.of_other_gain, "their gain differs from that of another pass at the same speed"),
+            (&self.dropped_out, "the signal drops out"),
+        ];
+        all.into_iter().filter_map(note).collect()
     }
 
     /// What the passes leave open, a sentence each.
@@ -232,10 +229,17 @@ fn drop_outs(recording: &Recording, pass_defects: &[PassDefect]) -> Vec<(usize, 
     pass_defects.iter().filter_map(stretch).collect()
 }
 
+/// Middle of a finding in m, if it has a place.
+fn middle_m(finding: &Finding) -> Option<f64> {
+    match finding.place {
+        Place::Stretch { from_m, to_m } => Some(0.5 * (from_m + to_m)),
+        Place::Everywhere => None,
+    }
+}
+
 /// Whether the middle of a finding lies in a stretch of a pass.
 fn is_within(finding: &Finding, stretches_m: &[(usize, [f64; 2])]) -> bool {
-    let Place::Stretch { from_m, to_m } = finding.place else { return false };
-    let middle_m = 0.5 * (from_m + to_m);
+    let Some(middle_m) = middle_m(finding) else { return false };
     stretches_m.iter().any(|&(_, [from_m, to_m])| (from_m..=to_m).contains(&middle_m))
 }
 
@@ -274,8 +278,7 @@ fn leaves_speeds(recording: &Recording, passes: &[usize]) -> bool {
 ///
 /// A defect that lifts the wheel lies before the stretch without contact.
 fn is_landing(finding: &Finding, lost: &LossOfContact) -> bool {
-    let Place::Stretch { from_m, to_m } = finding.place else { return false };
-    let middle_m = 0.5 * (from_m + to_m);
+    let Some(middle_m) = middle_m(finding) else { return false };
     lost.x_m.iter().any(|&[from_m, to_m]| from_m < middle_m && middle_m <= to_m)
 }
 

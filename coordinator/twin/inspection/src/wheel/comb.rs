@@ -50,7 +50,7 @@ pub fn comb(pass: &Pass, spacing_m: f64, circumferences_m: [f64; 2], alpha: f64)
     let rate = pass.signal.sample_rate_hz();
     let length = (BLOCK_S * rate) as usize;
     let count = pass.signal.len() / length;
-    let speed = crate::along::speed_m_s(pass);
+    let speed = pass.mean_speed_m_s();
     let band_hz = [speed / WAVELENGTHS_M[1], (speed / WAVELENGTHS_M[0]).min(0.4 * rate)];
     let sets = ((speed / circumferences_m[1] * BLOCK_S / SET_CELLS) as usize).min(SETS_MAX);
     if count < BLOCKS_MIN || band_hz[1] < 2.0 * band_hz[0] || sets < 2 {

@@ -6,7 +6,7 @@
 
 use crate::along::{
     Line, Ruler, Spectrum, Surface, amplitude, bonferroni, by_speed, combine_dependent_p_values,
-    on_even_places, separate_wavelengths, speed_m_s,
+    on_even_places, separate_wavelengths,
 };
 use num_complex::Complex64;
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -301,7 +301,7 @@ impl OrderSearch<'_> {
 
     fn audible(&self, wave_number: f64) -> bool {
         self.recording.passes.iter().all(|pass| {
-            let frequency = wave_number * speed_m_s(pass);
+            let frequency = wave_number * pass.mean_speed_m_s();
             (LOW_HZ..HIGH_SHARE * pass.signal.sample_rate_hz()).contains(&frequency)
         })
     }
@@ -317,7 +317,7 @@ fn stands_out(source: SpectrumSource, lines: &[Line], passes: &[Line]) -> bool {
 /// The acceleration minus its mean, averaged over `step_m`, so that short waves do not alias to long ones.
 fn smoothed(pass: &Pass, step_m: f64) -> Vec<Complex64> {
     let samples = pass.signal.samples();
-    let width = ((step_m / speed_m_s(pass) * pass.signal.sample_rate_hz()) as usize).max(1);
+    let width = ((step_m / pass.mean_speed_m_s() * pass.signal.sample_rate_hz()) as usize).max(1);
     let mean = samples.iter().sum::<f64>() / samples.len() as f64;
     // Twice, for side lobes of the square of those of a single average.
     let mut values: Vec<f64> = samples.iter().map(|value| value - mean).collect();
