@@ -1,6 +1,6 @@
 //! Readable names of physics, sleepers and locations.
 
-use tracktwin_diagnosis::{Diagnosis, Hypothesis, Location, UNKNOWN};
+use tracktwin_diagnosis::{Diagnosis, Hypothesis, Location, UNKNOWN, run_of};
 use tracktwin_track::extension::Kind;
 
 /// Maximum number of sleepers that are listed individually.
@@ -57,21 +57,16 @@ pub(super) fn list(items: &[String]) -> String {
     }
 }
 
-/// Sleepers as "SN18", as "SN18 to SN24" if they are consecutive, or listed individually.
+/// Sleepers as "SN18", as [`run_of`] if they are a run, or listed individually.
 pub(super) fn sleepers(diagnosis: &Diagnosis, ids: &[String]) -> String {
-    let mut places = numbers(diagnosis, ids);
-    places.sort_unstable();
-    let together =
-        places.len() == ids.len() && places.windows(2).all(|pair| pair[1] == pair[0] + 1);
-    match (ids, places.first(), places.last()) {
-        ([first, _, .., last], Some(_), Some(_)) if together && ids.len() > 2 => {
-            format!("{first} to {last}")
-        }
-        _ if ids.len() > NAMED_MAX => {
+    let all: Vec<String> = diagnosis.track.iter().map(|sleeper| sleeper.id.clone()).collect();
+    run_of(ids, &all).unwrap_or_else(|| {
+        if ids.len() > NAMED_MAX {
             format!("{} and {} more", ids[..NAMED_MAX].join(", "), ids.len() - NAMED_MAX)
+        } else {
+            list(ids)
         }
-        _ => list(ids),
-    }
+    })
 }
 
 /// Indices of the sleepers with these names.

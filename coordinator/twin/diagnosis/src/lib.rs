@@ -67,6 +67,7 @@ pub use quantity::{Common, Own};
 pub use screen::{Template, templates};
 pub use search::{Fitted, Round, SearchOutcome, Stage, first_calibration, search};
 pub use section::{Section, owner};
+pub use sentence::run_of;
 pub use signature::signature;
 pub use sleeper_pattern::SleeperPattern;
 pub use spectra::{Spectra, SpeedSpectra, are_one_speed};

@@ -3,8 +3,12 @@
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
 use crate::search::Extent;
+use crate::transfer::Transfer;
 use nalgebra::DVector;
 use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::Arc;
+use tracktwin_track::extension::{Extension, InstanceError};
 
 /// Prior standard deviation of an extension's strength relative to each trial value.
 const STRENGTH_DEVIATION: f64 = 0.3;
@@ -41,10 +45,8 @@ pub fn templates(
     candidates: &[Candidate],
     progress: &(dyn Fn() + Sync),
 ) -> Result<Vec<Template>, CalibrationError> {
-    let Problem { forward, observation, .. } = *problem;
     let accepted = problem.extensions(&calibration.values)?;
-    let known = forward.transfer_to_vary(&calibration.values, &accepted)?;
-    let plain = forward.levels(&known, &calibration.values);
+    let beside = Beside::new(problem, calibration, &accepted)?;
     let trials: Vec<(usize, usize)> = candidates
         .iter()
         .enumerate()
@@ -54,37 +56,100 @@ pub fn templates(
         .into_par_iter()
         .filter_map(|(number, trial)| {
             let candidate = &candidates[number];
-            let extension = candidate.with(&candidate.trials[trial]);
-            let section = &forward.section;
-            let built = section.in_model(&extension).build(&section.track.design, section.spans());
+            let section = &problem.forward.section;
+            let built = beside.built(candidate, &candidate.trials[trial]);
             progress();
             let extensions = [&accepted[..], &[built.ok()?]].concat();
-            let transfer = forward.transfer_beside(&known, &calibration.values, &extensions);
             let sleepers = if candidate.is_everywhere() {
                 0..section.sleepers()
             } else {
-                forward.felt_at(Extent::of(candidate, section).spacings())
+                problem.forward.felt_at(Extent::of(candidate, section).spacings())
             };
-            let first = sleepers.start * forward.per_sleeper();
-            let near = forward.levels_at(&transfer.ok()?, &calibration.values, sleepers);
-            let mut changed = DVector::zeros(plain.len());
-            let mut rows = changed.rows_mut(first, near.len());
-            rows.copy_from(&(near - plain.rows(first, rows.len())));
-            let change = observation.fitted(&observation.whiten(&changed));
-            let projected_gradient = calibration.jacobian.tr_mul(&change);
-            let imitation = calibration.precision.solve(&projected_gradient);
-            let detectability = change.norm_squared() - projected_gradient.dot(&imitation);
-            Some(Template {
-                candidate: number,
-                trial,
-                change,
-                projected_gradient,
-                imitation,
-                detectability,
-            })
+            beside.template([number, trial], &extensions, sleepers)
         })
         .collect();
     Ok(templates)
+}
+
+/// Computes the signatures of replacing the last candidate of a problem by each of these, which are the same at
+/// other sleepers and have its calibrated values.
+///
+/// # Errors
+/// [`CalibrationError`] if no model exists for the calibrated values.
+pub(crate) fn templates_instead(
+    problem: &Problem<'_>,
+    calibration: &Calibration,
+    candidates: &[Candidate],
+) -> Result<Vec<Template>, CalibrationError> {
+    let mut accepted = problem.extensions(&calibration.values)?;
+    let beside = Beside::new(problem, calibration, &accepted)?;
+    accepted.pop();
+    let values = calibration.values.as_slice();
+    let templates = candidates
+        .par_iter()
+        .enumerate()
+        .filter_map(|(number, candidate)| {
+            let logarithms = &values[values.len() - candidate.free.len()..];
+            let fitted: Vec<f64> = logarithms.iter().map(|logarithm| logarithm.exp()).collect();
+            let built = beside.built(candidate, &fitted).ok()?;
+            let extensions = [&accepted[..], &[built]].concat();
+            beside.template([number, 0], &extensions, 0..problem.forward.section.sleepers())
+        })
+        .collect();
+    Ok(templates)
+}
+
+/// A calibrated track, from which tracks that differ a little are computed.
+struct Beside<'a> {
+    problem: &'a Problem<'a>,
+    calibration: &'a Calibration,
+    known: Transfer,
+    /// Log powers of the known track.
+    plain: DVector<f64>,
+}
+
+impl<'a> Beside<'a> {
+    fn new(
+        problem: &'a Problem<'a>,
+        calibration: &'a Calibration,
+        accepted: &[Arc<dyn Extension>],
+    ) -> Result<Self, CalibrationError> {
+        let known = problem.forward.transfer_to_vary(&calibration.values, accepted)?;
+        let plain = problem.forward.levels(&known, &calibration.values);
+        Ok(Self { problem, calibration, known, plain })
+    }
+
+    fn built(
+        &self,
+        candidate: &Candidate,
+        values: &[f64],
+    ) -> Result<Arc<dyn Extension>, InstanceError> {
+        let section = &self.problem.forward.section;
+        section.in_model(&candidate.with(values)).build(&section.track.design, section.spans())
+    }
+
+    /// Signature of the track with these extensions, which differs from the known one at these sleepers. The
+    /// numbers are those of candidate and trial. `None` if no model exists.
+    fn template(
+        &self,
+        [candidate, trial]: [usize; 2],
+        extensions: &[Arc<dyn Extension>],
+        sleepers: Range<usize>,
+    ) -> Option<Template> {
+        let Problem { forward, observation, .. } = *self.problem;
+        let Calibration { values, jacobian, precision, .. } = self.calibration;
+        let transfer = forward.transfer_beside(&self.known, values, extensions).ok()?;
+        let first = sleepers.start * forward.per_sleeper();
+        let near = forward.levels_at(&transfer, values, sleepers);
+        let mut changed = DVector::zeros(self.plain.len());
+        let mut rows = changed.rows_mut(first, near.len());
+        rows.copy_from(&(near - self.plain.rows(first, rows.len())));
+        let change = observation.fitted(&observation.whiten(&changed));
+        let projected_gradient = jacobian.tr_mul(&change);
+        let imitation = precision.solve(&projected_gradient);
+        let detectability = change.norm_squared() - projected_gradient.dot(&imitation);
+        Some(Template { candidate, trial, change, projected_gradient, imitation, detectability })
+    }
 }
 
 impl Template {

@@ -168,15 +168,23 @@ impl Section {
     }
 
     /// Converts an extension from the coordinates of the recording (compared sleepers, positions in m) to
-    /// those of the model's track.
+    /// those of the model's track. What acts at three in four sleepers goes on beyond an end that has it, as what acts
+    /// at all of them does.
     pub fn in_model(&self, extension: &ExtensionInstance) -> ExtensionInstance {
         let mut placed = extension.clone();
         placed.x_m = extension.x_m.map(|ends| ends.map(|x_m| self.model_x_m(x_m)));
-        placed.sleepers = extension
-            .sleepers
-            .as_ref()
-            .map(|numbers| numbers.iter().map(|&number| self.in_track(number)).collect());
+        placed.sleepers = extension.sleepers.as_ref().map(|numbers| self.acting(numbers));
         placed
+    }
+
+    /// Indices in the whole track of the sleepers at which an effect acts, from those of the compared ones.
+    fn acting(&self, numbers: &[usize]) -> Vec<usize> {
+        let last = self.sleepers() - 1;
+        let goes_on = 4 * numbers.len() >= 3 * self.sleepers();
+        let at = |end: usize| goes_on && numbers.contains(&end);
+        let before = if at(0) { 0..self.in_track(0) } else { 0..0 };
+        let behind = if at(last) { self.in_track(last) + 1..self.spans() - 1 } else { 0..0 };
+        before.chain(numbers.iter().map(|&number| self.in_track(number))).chain(behind).collect()
     }
 
     /// Rail nodes that contribute to a sleeper's window at a speed and band centre in Hz.
@@ -222,6 +230,20 @@ mod tests {
         assert_eq!(are([2.0, 2.0], [2.12, 2.12]), [true; 2]);
         assert_eq!(are([2.0, 2.0], [2.13, 2.13]), [false; 2]);
         assert_eq!(are([1.0, 4.0], [2.5, 2.6]), [true; 2]);
+    }
+
+    #[test]
+    fn what_most_sleepers_have_goes_on_beyond_the_ends_that_have_it() {
+        let section = Section::new(TrackDesign::v_track(), 8, 1.0);
+        let beyond = section.spans_beyond - 1;
+        let of = |numbers: &[usize]| section.acting(numbers);
+        let all: Vec<usize> = (0..section.spans() - 1).collect();
+        let but = |hole: usize| -> Vec<usize> {
+            all.iter().copied().filter(|it| *it != beyond + hole).collect()
+        };
+        assert_eq!(of(&[0, 1, 2, 3, 5, 6, 7]), but(4));
+        assert_eq!(of(&[1, 2, 3, 4, 5, 6, 7]), all[beyond + 1..]);
+        assert_eq!(of(&[0, 1, 2, 3, 4]), all[beyond..beyond + 5]);
     }
 
     /// The model's sleepers are evenly spaced, those of the recording are not quite.

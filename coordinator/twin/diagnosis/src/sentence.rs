@@ -142,13 +142,24 @@ fn place(hypothesis: &Hypothesis, sleepers: &[String]) -> String {
     }
 }
 
-/// Ids of some of all sleepers; of a contiguous run only the first and the last.
+/// Ids of some of all sleepers, as a run where they are one.
 fn together(some: &[String], all: &[String]) -> String {
-    if all.windows(some.len()).any(|run| run == some) {
-        format!("{} to {}", some[0], some[some.len() - 1])
-    } else {
-        some.join(", ")
+    run_of(some, all).unwrap_or_else(|| some.join(", "))
+}
+
+/// Ids of some of all sleepers, both in the order of the track, as "SN12 to SN25" or "SN12 to SN25 except SN18" if at
+/// most a quarter between the first and the last is missing. `None` for fewer than three or for others.
+pub fn run_of(some: &[String], all: &[String]) -> Option<String> {
+    let index = |id: &String| all.iter().position(|known| known == id);
+    let [first, _, .., last] = some else { return None };
+    let run = all.get(index(first)?..=index(last)?)?;
+    let holes: Vec<String> = run.iter().filter(|id| !some.contains(id)).cloned().collect();
+    if run.len() != some.len() + holes.len() || 4 * holes.len() > run.len() {
+        return None;
     }
+    let except =
+        if holes.is_empty() { String::new() } else { format!(" except {}", holes.join(", ")) };
+    Some(format!("{first} to {last}{except}"))
 }
 
 /// Whether the location of a kind is a stretch of the rail.
@@ -224,6 +235,8 @@ mod tests {
     fn a_run_of_sleepers_is_named_by_its_ends() {
         let all = track();
         assert_eq!(together(&all[5..19], &all), "SN12 to SN25");
+        let holes = [&all[5..9], &all[10..12], &all[13..19]].concat();
+        assert_eq!(together(&holes, &all), "SN12 to SN25 except SN16, SN19");
         let every_fourth: Vec<String> = all.iter().step_by(8).cloned().collect();
         assert_eq!(together(&every_fourth, &all), "SN7, SN15, SN23, SN31");
     }

@@ -1,5 +1,6 @@
 //! Fits of candidates together with the baseline, and new fits of the baseline from their results.
 
+use super::holes::with_holes;
 use super::{Fitted, Stage};
 use crate::calibration::{Calibration, CalibrationError, Descent, Problem};
 use crate::candidate::Candidate;
@@ -76,7 +77,23 @@ pub(super) fn fit(
         })
         .collect();
     fitted.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
-    to_the_end(problem, current, all_along(problem, current, once_each(fitted)))
+    let mut fitted = all_along(problem, current, once_each(fitted));
+    fitted.extend(with_holes(problem, current, &fitted));
+    fitted.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+    to_the_end(problem, current, fitted)
+}
+
+/// Fits in descending order with those of an earlier search of the same model, whose evidence relative to the
+/// baseline is less by `lost` nats. Of two fits of one candidate the better one stays.
+pub(super) fn with_earlier(fitted: Vec<Fitted>, earlier: Vec<Fitted>, lost: f64) -> Vec<Fitted> {
+    if fitted.is_empty() {
+        return fitted;
+    }
+    let earlier =
+        earlier.into_iter().map(|it| Fitted { log_evidence: it.log_evidence - lost, ..it });
+    let mut all: Vec<Fitted> = fitted.into_iter().chain(earlier).collect();
+    all.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+    once_each(all)
 }
 
 /// Repeats the fits of the best candidate and of its competitors, as far as they act on all sleepers, from

@@ -1,10 +1,12 @@
 //! Search for left-out physics: baseline, alarm, candidates, acceptance.
 
 mod chance;
+mod choice;
 mod detected_shape;
 mod everywhere;
 mod extent;
 mod fit;
+mod holes;
 mod limits;
 mod nested;
 mod outlier_starts;
@@ -22,7 +24,7 @@ pub(crate) use extent::Extent;
 pub(crate) use limits::HELD_OUT_MIN;
 pub(crate) use probability::{EVIDENCE_TEMPERING, Probabilities};
 
-use self::fit::retuned;
+use self::fit::{retuned, with_earlier};
 use self::limits::FALSE_ALARM;
 use self::round::{Setting, accepted_candidate, unknown_is_predicted};
 use self::threshold::EvidenceThreshold;
@@ -279,15 +281,18 @@ impl SearchOutcome {
             setting.round(&problem, &self.last, all, threshold, &hopeless, progress)?;
         if let Some(better) = retuned(&problem, &self.last, &round.fitted)? {
             // The fits of the candidates found a better baseline, which is used from here on.
-            self.last = better;
+            let before = std::mem::replace(&mut self.last, better);
+            let hopeless = round.hopeless();
+            let earlier = round.fitted;
             let held_out = setting.held_out(&accepted, &self.last.values)?;
             densities[accepted.len()] = log_densities(&held_out);
             if accepted.is_empty() {
                 self.baseline = self.last.clone();
             }
-            let hopeless = round.hopeless();
             (round, ports) =
                 setting.round(&problem, &self.last, all, threshold, &hopeless, progress)?;
+            let lost = self.last.log_evidence - before.log_evidence;
+            round.fitted = with_earlier(round.fitted, earlier, lost);
         }
         let competitor = self.competing_unknown(&round, &ports, &forward.section);
         if let Some(best) =
