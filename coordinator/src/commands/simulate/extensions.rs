@@ -14,7 +14,7 @@ use tracktwin_track::extension::{ExtensionInstance, Kind, KindParameter};
 pub(in crate::commands) struct Extensions {
     /// Extension: physics beyond the paper or a fault of the measuring chain, e.g.
     /// `sleeper_bolt:stiffness_N_per_m=3e7`, `hanging_sleeper@SN19-SN20:gap_m=2e-4`,
-    /// `fastening_clamp@SN10-SN30/4:...`, `rail_joint@2.4375m:dip_m=8e-5`, `corrugation@2m-3m:...`;
+    /// `fastening_clamp@SN10-SN22/4:...`, `rail_joint@2.4375m:dip_m=8e-5`, `corrugation@2m-3m:...`;
     /// may be repeated. `--extend list` lists all kinds with their parameters.
     #[arg(long = "extend", value_name = "NAME[@PLACE][:PARAMETER=VALUE,...]")]
     extend: Vec<String>,

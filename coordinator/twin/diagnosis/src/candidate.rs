@@ -22,6 +22,8 @@ pub struct Candidate {
     pub trials: Vec<Vec<f64>>,
     /// Length ratio of the track to V-Track; it scales the ranges of the parameters.
     pub length_ratio: f64,
+    /// Evidence in nats that the choice of its sleepers costs: zero where it is one of few places.
+    pub choice_nats: f64,
 }
 
 impl Candidate {
@@ -143,6 +145,7 @@ fn of_family(
         trials: family.trials.values().into_iter().map(trial).collect(),
         free,
         length_ratio,
+        choice_nats: 0.0,
     }
 }
 

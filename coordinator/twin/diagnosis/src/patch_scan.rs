@@ -103,7 +103,7 @@ impl Patch {
         let extension = ExtensionInstance::new(kind.physics).at(stretch_m);
         let trials = vec![vec![length_m, amplitude_m]];
         let length_ratio = section.track.design.length_ratio();
-        Some(Candidate { kind, extension, free, trials, length_ratio })
+        Some(Candidate { kind, extension, free, trials, length_ratio, choice_nats: 0.0 })
     }
 }
 

@@ -32,6 +32,8 @@ pub struct Template {
     pub imitation: DVector<f64>,
     /// Squared norm of the change after the baseline was fitted again: `d'^2`.
     pub detectability: f64,
+    /// Evidence in nats that the choice of the candidate's sleepers costs.
+    choice_nats: f64,
 }
 
 /// Computes the signatures of all candidates and trials on a calibrated track. A trial for which no model
@@ -65,7 +67,7 @@ pub fn templates(
             } else {
                 problem.forward.felt_at(Extent::of(candidate, section).spacings())
             };
-            beside.template([number, trial], &extensions, sleepers)
+            beside.template(candidate, [number, trial], &extensions, sleepers)
         })
         .collect();
     Ok(templates)
@@ -93,7 +95,12 @@ pub(crate) fn templates_instead(
             let fitted: Vec<f64> = logarithms.iter().map(|logarithm| logarithm.exp()).collect();
             let built = beside.built(candidate, &fitted).ok()?;
             let extensions = [&accepted[..], &[built]].concat();
-            beside.template([number, 0], &extensions, 0..problem.forward.section.sleepers())
+            beside.template(
+                candidate,
+                [number, 0],
+                &extensions,
+                0..problem.forward.section.sleepers(),
+            )
         })
         .collect();
     Ok(templates)
@@ -128,10 +135,11 @@ impl<'a> Beside<'a> {
         section.in_model(&candidate.with(values)).build(&section.track.design, section.spans())
     }
 
-    /// Signature of the track with these extensions, which differs from the known one at these sleepers. The
-    /// numbers are those of candidate and trial. `None` if no model exists.
+    /// Signature of a candidate, with its number and that of a trial: of the track with these extensions, which
+    /// differs from the known one at these sleepers. `None` if no model exists.
     fn template(
         &self,
+        &Candidate { choice_nats, .. }: &Candidate,
         [candidate, trial]: [usize; 2],
         extensions: &[Arc<dyn Extension>],
         sleepers: Range<usize>,
@@ -148,7 +156,15 @@ impl<'a> Beside<'a> {
         let projected_gradient = jacobian.tr_mul(&change);
         let imitation = precision.solve(&projected_gradient);
         let detectability = change.norm_squared() - projected_gradient.dot(&imitation);
-        Some(Template { candidate, trial, change, projected_gradient, imitation, detectability })
+        Some(Template {
+            candidate,
+            trial,
+            change,
+            projected_gradient,
+            imitation,
+            detectability,
+            choice_nats,
+        })
     }
 }
 
@@ -182,5 +198,6 @@ impl Template {
         let spread = 1.0 + variance * square;
         along - 0.5 * square + 0.5 * variance * (along - square).powi(2) / spread
             - 0.5 * spread.ln()
+            - self.choice_nats
     }
 }

@@ -32,6 +32,7 @@ pub fn signature(
         free: Vec::new(),
         trials: vec![Vec::new()],
         length_ratio: section.track.design.length_ratio(),
+        choice_nats: 0.0,
     };
     let problem = Problem { forward: &prepared.forward, observation, candidates: &[] };
     let hidden = [candidate];

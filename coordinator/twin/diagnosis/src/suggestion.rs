@@ -78,7 +78,7 @@ fn candidate(finding: &Finding, length_ratio: f64) -> Option<Candidate> {
         found.map_or(parameter.scaled(parameter.typical, length_ratio), |&(mean, _)| mean)
     };
     let trial = free.iter().map(found).collect();
-    Some(Candidate { kind, extension, free, trials: vec![trial], length_ratio })
+    Some(Candidate { kind, extension, free, trials: vec![trial], length_ratio, choice_nats: 0.0 })
 }
 
 #[cfg(test)]

@@ -47,7 +47,14 @@ pub fn accepted(
             };
             let free = free(hypothesis, kind);
             let values = free.iter().map(|it| hypothesis.parameters[it.name].mean).collect();
-            Some(Candidate { kind, extension, free, trials: vec![values], length_ratio })
+            Some(Candidate {
+                kind,
+                extension,
+                free,
+                trials: vec![values],
+                length_ratio,
+                choice_nats: 0.0,
+            })
         })
         .collect()
 }

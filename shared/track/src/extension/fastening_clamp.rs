@@ -28,11 +28,10 @@ pub(super) const KIND: Kind = Kind {
     ],
     look_alikes: &["support_variation"],
     would_separate: "25 or more spans: the clamps come back every few sleepers",
-    screening: Screening::tried(&[Family::new(
-        Places::Patterns,
-        &["vertical_N_per_m", "rotational_N_m_per_rad"],
-        Trials::Grid(&[&[3e7, 1.5e8], &[3e4, 3e5]]),
-    )]),
+    screening: Screening::tried(&[
+        Family::new(Places::Patterns, &FREE, TRIALS),
+        Family::new(Places::Sleepers, &FREE, TRIALS),
+    ]),
     build: |inputs| {
         Ok(Arc::new(FasteningClamp {
             sleepers: inputs.sleepers(),
@@ -41,6 +40,9 @@ pub(super) const KIND: Kind = Kind {
         }))
     },
 };
+
+const FREE: [&str; 2] = ["vertical_N_per_m", "rotational_N_m_per_rad"];
+const TRIALS: Trials = Trials::Grid(&[&[3e7, 1.5e8], &[3e4, 3e5]]);
 
 /// Springs between rail and rail seat, and against the rail's rotation over the sleeper, which
 /// itself does not tilt.

@@ -1,10 +1,20 @@
 //! Evidence that the choice of sleepers costs.
 
+use crate::candidate::Candidate;
+
 /// Logarithm of the number of ways to choose some of all sleepers, in nats: by this much the evidence of the best choice
 /// is too high by chance.
 pub(super) fn choice_cost(of: usize, chosen: usize) -> f64 {
     let ln_factorial = |number: usize| libm::lgamma(number as f64 + 1.0);
     ln_factorial(of) - ln_factorial(chosen) - ln_factorial(of - chosen)
+}
+
+/// A candidate at some of all sleepers, chosen freely.
+pub(super) fn on(candidate: &Candidate, chosen: Vec<usize>, of: usize) -> Candidate {
+    let mut candidate = candidate.clone();
+    candidate.choice_nats = choice_cost(of, chosen.len());
+    candidate.extension.sleepers = Some(chosen);
+    candidate
 }
 
 #[cfg(test)]

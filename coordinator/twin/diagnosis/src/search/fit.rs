@@ -129,12 +129,22 @@ fn on_other_sleepers(problem: &Problem<'_>, current: &Calibration, mut fitted: F
     });
     let best = with.best_from(fitted.calibration.clone(), starts.into_iter().flatten());
     if best.objective < fitted.calibration.objective - BETTER {
-        fitted.log_evidence = best.log_evidence - current.log_evidence;
+        fitted.log_evidence = log_evidence(&fitted.candidate, &best, current);
         fitted.calibration = best;
     } else {
         fitted.calibration = fitted.calibration.beside(&best);
     }
     fitted
+}
+
+/// Log ratio of the evidence of a candidate's fit to the model without it, in nats, less what the choice of its
+/// sleepers costs.
+pub(super) fn log_evidence(
+    candidate: &Candidate,
+    fitted: &Calibration,
+    current: &Calibration,
+) -> f64 {
+    fitted.log_evidence - current.log_evidence - candidate.choice_nats
 }
 
 /// Values of the model without a candidate, and then those of one of its trials.
@@ -169,7 +179,7 @@ fn further(problem: &Problem<'_>, current: &Calibration, mut fitted: Fitted) -> 
         let Ok(again) = with.calibrate_in_range(fitted.calibration.values.clone()) else { break };
         let gain = fitted.calibration.objective - again.objective;
         if gain > 0.0 {
-            fitted.log_evidence = again.log_evidence - current.log_evidence;
+            fitted.log_evidence = log_evidence(&fitted.candidate, &again, current);
             fitted.calibration = again.beside(&fitted.calibration);
         }
         if gain < BETTER {
@@ -213,8 +223,7 @@ impl<'t> Begun<'t> {
     fn given_up(self, current: &Calibration) -> Fitted {
         let calibration = self.descent.state;
         let gain = calibration.objective - calibration.predicted_objective();
-        let log_evidence = calibration.log_evidence + gain - current.log_evidence;
-        Self::fitted(self.template, self.candidates, calibration, log_evidence)
+        Self::fitted(self.template, self.candidates, calibration, current, gain)
     }
 
     /// Continues the fit to its end; restricts its parameters to their ranges if the result is implausible.
@@ -233,17 +242,19 @@ impl<'t> Begun<'t> {
         if calibration.log_evidence > current.log_evidence && !is_plausible {
             calibration = with.calibrate_in_range(self.start)?;
         }
-        let log_evidence = calibration.log_evidence - current.log_evidence;
-        Ok(Self::fitted(self.template, self.candidates, calibration, log_evidence))
+        Ok(Self::fitted(self.template, self.candidates, calibration, current, 0.0))
     }
 
+    /// The fit, whose further steps are predicted to gain `predicted` nats.
     fn fitted(
         template: &Template,
         mut candidates: Vec<Candidate>,
         calibration: Calibration,
-        log_evidence: f64,
+        current: &Calibration,
+        predicted: f64,
     ) -> Fitted {
         let candidate = candidates.pop().expect("the candidate is the last in the model");
+        let log_evidence = log_evidence(&candidate, &calibration, current) + predicted;
         let detectability = template.detectability.max(0.0).sqrt();
         Fitted {
             candidate,

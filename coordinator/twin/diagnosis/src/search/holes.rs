@@ -1,7 +1,9 @@
-//! Sleepers without an effect that all others have: a bolt that is missing where all sleepers are bolted down.
+//! Sleepers without an effect: a bolt that is missing where all others are bolted down, or a sleeper that a freely chosen
+//! set contains by chance.
 
 use super::Fitted;
-use super::choice::choice_cost;
+use super::choice::on;
+use super::fit::log_evidence;
 use super::threshold::first_evidence;
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
@@ -14,8 +16,8 @@ const NEAR_SHARE: f64 = 0.3;
 /// Largest share of the sleepers that may be without the effect.
 const HOLES_MAX: f64 = 0.25;
 
-/// Searches the fits of candidates that act on all sleepers for sleepers without the effect. Returns the fits with
-/// such holes.
+/// Searches the fits of candidates that act on all sleepers, or on a freely chosen set, for sleepers without the effect.
+/// Returns the fits with such holes.
 pub(super) fn with_holes(
     problem: &Problem<'_>,
     current: &Calibration,
@@ -24,9 +26,8 @@ pub(super) fn with_holes(
     let best = fitted.first().map_or(f64::INFINITY, |best| best.log_evidence);
     let may_have_some = |fitted: &&Fitted| {
         let Fitted { candidate, log_evidence, .. } = fitted;
-        candidate.is_everywhere()
-            && candidate.kind.place == PlaceKind::Sleepers
-            && *log_evidence >= NEAR_SHARE * best.max(0.0)
+        let acts_on_all = candidate.is_everywhere() && candidate.kind.place == PlaceKind::Sleepers;
+        (acts_on_all || candidate.choice_nats > 0.0) && *log_evidence >= NEAR_SHARE * best.max(0.0)
     };
     let tried = fitted.iter().filter(may_have_some);
     tried.filter_map(|fitted| Holes { problem, current }.of(fitted).ok().flatten()).collect()
@@ -40,13 +41,16 @@ struct Holes<'a> {
 impl Holes<'_> {
     /// The fit with the holes that raise its evidence, one after the other; `None` without any.
     fn of(&self, fitted: &Fitted) -> Result<Option<Fitted>, CalibrationError> {
-        let sleepers = self.problem.forward.section.sleepers();
-        let most = (HOLES_MAX * sleepers as f64) as usize;
+        // A hole in what all have is an effect of its own; a choice has its cost.
+        let least = if fitted.candidate.is_everywhere() { first_evidence() } else { 0.0 };
+        let acting = fitted.candidate.extension.sleepers.as_ref().map(Vec::len);
+        let acting = acting.unwrap_or_else(|| self.problem.forward.section.sleepers());
+        let most = (HOLES_MAX * acting as f64) as usize;
         let mut best: Option<Fitted> = None;
-        for holes in 1..=most {
+        for _ in 0..most {
             let known = best.as_ref().unwrap_or(fitted);
-            let Some(further) = self.further(known, holes)? else { break };
-            if further.log_evidence < known.log_evidence + first_evidence() {
+            let Some(further) = self.further(known, least)? else { break };
+            if further.log_evidence < known.log_evidence + least {
                 break;
             }
             best = Some(further);
@@ -54,16 +58,14 @@ impl Holes<'_> {
         Ok(best)
     }
 
-    /// The fit with one more hole, the `holes`-th, where the signature promises most.
-    fn further(&self, known: &Fitted, holes: usize) -> Result<Option<Fitted>, CalibrationError> {
+    /// The fit with one more hole, where the signature promises most; `None` if it promises less than `least` nats.
+    fn further(&self, known: &Fitted, least: f64) -> Result<Option<Fitted>, CalibrationError> {
         let sleepers = self.problem.forward.section.sleepers();
         let acting = known.candidate.extension.sleepers.clone();
         let acting = acting.unwrap_or_else(|| (0..sleepers).collect());
         let without = |hole: &usize| {
-            let mut candidate = known.candidate.clone();
             let left = acting.iter().copied().filter(|sleeper| sleeper != hole);
-            candidate.extension.sleepers = Some(left.collect());
-            candidate
+            on(&known.candidate, left.collect(), sleepers)
         };
         let tried: Vec<Candidate> = acting.iter().map(without).collect();
         let with = |candidate: &Candidate| {
@@ -77,15 +79,14 @@ impl Holes<'_> {
         let Some((promised, template)) = evidence.max_by(|a, b| a.0.total_cmp(&b.0)) else {
             return Ok(None);
         };
-        if promised < first_evidence() {
+        let candidate = tried[template.candidate].clone();
+        if promised + known.candidate.choice_nats < least {
             return Ok(None);
         }
-        let candidate = tried[template.candidate].clone();
         let candidates = with(&candidate);
         let problem = Problem { candidates: &candidates, ..*self.problem };
         let calibration = problem.calibrate_in_range(values.clone())?;
-        let cost = choice_cost(sleepers, holes);
-        let log_evidence = calibration.log_evidence - self.current.log_evidence - cost;
+        let log_evidence = log_evidence(&candidate, &calibration, self.current);
         let Fitted { detectability, change, .. } = known.clone();
         Ok(Some(Fitted { candidate, calibration, log_evidence, detectability, change }))
     }

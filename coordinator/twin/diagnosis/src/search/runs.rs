@@ -1,6 +1,7 @@
-//! Runs of sleepers: the signature at three or more sleepers is about the sum of the signatures at single
-//! sleepers.
+//! Runs of sleepers, and sets of any: the signature at several sleepers is about the sum of the signatures at single
+//! ones.
 
+use super::choice::{choice_cost, on};
 use crate::calibration::Calibration;
 use crate::candidate::Candidate;
 use crate::screen::Template;
@@ -28,7 +29,7 @@ struct Singles<'a> {
     templates: BTreeMap<usize, &'a Template>,
 }
 
-/// The best run of each kind whose gain is larger than at any single location.
+/// The best run or set of each kind whose gain is larger than that of any of its candidates.
 pub(super) fn runs(
     templates: &[Template],
     all: &[Candidate],
@@ -41,11 +42,13 @@ pub(super) fn runs(
         };
         let least = templates.iter().filter(alone).map(|it| it.along(&current.residual));
         let least = (BETTER * least.fold(0.0, f64::max)).max(GAIN_MIN);
-        let Some((gain, run)) = singles.best_run(current).filter(|(gain, _)| *gain > least) else {
+        let run = singles.best_run(current).map(|(gain, run)| (gain, singles.on_run(run)));
+        let found = [run, singles.best_set(current)].into_iter().flatten();
+        let Some((gain, candidate)) =
+            found.filter(|(gain, _)| *gain > least).max_by(|a, b| a.0.total_cmp(&b.0))
+        else {
             continue;
         };
-        let mut candidate = singles.candidate.clone();
-        candidate.extension.sleepers = Some(run.collect());
         let known = best.get(candidate.kind.physics).map_or(0.0, |(known, _)| *known);
         if gain > known {
             best.insert(candidate.kind.physics, (gain, candidate));
@@ -80,6 +83,35 @@ fn singles<'a>(templates: &'a [Template], all: &'a [Candidate]) -> Vec<Singles<'
 }
 
 impl Singles<'_> {
+    fn on_run(&self, run: Range<usize>) -> Candidate {
+        let mut candidate = self.candidate.clone();
+        candidate.extension.sleepers = Some(run.collect());
+        candidate
+    }
+
+    /// The set of two or more sleepers whose summed signature gains most in the residual, less what the choice costs,
+    /// and this gain in nats. Sleepers are added one by one. Not for a kind that affects few sleepers.
+    fn best_set(&self, current: &Calibration) -> Option<(f64, Candidate)> {
+        if self.candidate.is_of_few() {
+            return None;
+        }
+        let count = self.templates.len();
+        let mut chosen: Vec<usize> = Vec::new();
+        let (mut sum, mut best) = (Sum::none(current), f64::NEG_INFINITY);
+        loop {
+            let left = self.templates.iter().filter(|(sleeper, _)| !chosen.contains(sleeper));
+            let with = left.map(|(&sleeper, template)| {
+                (sum.gain_with(template, current) - choice_cost(count, chosen.len() + 1), sleeper)
+            });
+            let further = with.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|it| it.0 > best);
+            let Some((gain, sleeper)) = further else { break };
+            (best, chosen) = (gain, [&chosen[..], &[sleeper]].concat());
+            sum.add(self.templates[&sleeper]);
+        }
+        chosen.sort_unstable();
+        (chosen.len() > 1).then(|| (best, on(self.candidate, chosen, count)))
+    }
+
     /// The run whose summed signature gains most in the residual, and its gain in nats.
     fn best_run(&self, current: &Calibration) -> Option<(f64, Range<usize>)> {
         let sleepers: Vec<usize> = self.templates.keys().copied().collect();
@@ -130,5 +162,64 @@ impl Sum {
         let square = self.change.norm_squared() - self.projected_gradient.dot(&self.imitation);
         let along = self.change.dot(&current.residual).max(0.0);
         0.5 * along.powi(2) / square.max(f64::MIN_POSITIVE)
+    }
+
+    /// [`Sum::gain`] with one more signature.
+    fn gain_with(&self, template: &Template, current: &Calibration) -> f64 {
+        let mut with = Self {
+            change: self.change.clone(),
+            projected_gradient: self.projected_gradient.clone(),
+            imitation: self.imitation.clone(),
+        };
+        with.add(template);
+        with.gain(current)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bands::Bands;
+    use crate::calibration::Problem;
+    use crate::candidate::candidates;
+    use crate::forward::Forward;
+    use crate::observation::Observation;
+    use crate::screen::templates;
+    use crate::section::Section;
+    use nalgebra::DMatrix;
+    use tracktwin_parameters::TrackDesign;
+    use tracktwin_track::extension::ExtensionInstance;
+
+    /// Sleepers of the candidate with clamps that is found on a track with clamps at these; `None` without any.
+    fn clamps_found(clamped: &[usize]) -> Option<Vec<usize>> {
+        let section = Section::new(TrackDesign::v_track(), 16, 1.0);
+        let forward = Forward::new(section, Bands::new(100.0, 3300.0), &[7.0, 13.0], vec![0.0; 2]);
+        let section = &forward.section;
+        let typical = forward.unknowns.typical();
+        let clamps = ExtensionInstance::new("fastening_clamp").on(clamped.iter().copied());
+        let clamps = clamps.with("vertical_N_per_m", 5e7).with("rotational_N_m_per_rad", 3e5);
+        let clamps = section.in_model(&clamps).build(&section.track.design, section.spans());
+        let log_power = forward.log_power(&typical, &[clamps.unwrap()]).unwrap();
+        let covariance = 0.02 * DMatrix::identity(forward.per_sleeper(), forward.per_sleeper());
+        let observation = Observation::new(log_power, &covariance, |_| false).unwrap();
+        let problem = Problem { forward: &forward, observation: &observation, candidates: &[] };
+        let current = problem.calibrate(typical).unwrap();
+        let is_clamp = |candidate: &Candidate| candidate.kind.physics == "fastening_clamp";
+        let all: Vec<Candidate> = candidates(section).into_iter().filter(is_clamp).collect();
+        let templates = templates(&problem, &current, &all, &|| ()).unwrap();
+        let found = runs(&templates, &all, &current).pop()?;
+        assert!(found.choice_nats > 0.0);
+        found.extension.sleepers
+    }
+
+    #[test]
+    fn clamps_are_found_at_every_third_or_fourth_sleeper_as_they_stand() {
+        assert_eq!(clamps_found(&[1, 4, 8, 11, 15]), Some(vec![1, 4, 8, 11, 15]));
+    }
+
+    #[test]
+    fn clamps_at_a_regular_distance_or_a_single_one_need_no_set() {
+        assert_eq!(clamps_found(&[1, 5, 9, 13]), None);
+        assert_eq!(clamps_found(&[7]), None);
     }
 }

@@ -118,6 +118,7 @@ mod tests {
             free: vec![kind.parameter("stiffness_N_per_m").unwrap()],
             trials: vec![vec![3e7]],
             length_ratio: 1.0,
+            choice_nats: 0.0,
         };
         let mut random = ChaCha8Rng::seed_from_u64(6);
         let mut normal = || StandardNormal.sample(&mut random);
