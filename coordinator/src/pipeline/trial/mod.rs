@@ -178,12 +178,16 @@ impl Trial {
         let scores = self.scores().await?;
         let mut open = self.open(&scores);
         open.retain(|number| !broken.contains_key(number));
+        let numbers: Vec<u32> = scores.keys().copied().collect();
+        let scores: Vec<CaseScore> = scores.into_values().map(|case| case.score).collect();
         if open.is_empty() {
-            let scores: Vec<CaseScore> = scores.into_values().map(|case| case.score).collect();
-            return self.sum_up(&scores).map(Some);
+            return self.sum_up(&scores, &(0..self.cases).collect::<Vec<_>>()).map(Some);
         }
         let (done, others) = (u64::from(self.cases) - open.len() as u64, open.len());
         if let Some(number) = self.lease(open).await? {
+            if !scores.is_empty() {
+                self.sum_up(&scores, &numbers)?;
+            }
             progress(done, &format!("case {number}"));
             self.work_on(number).await?;
         } else {
@@ -199,8 +203,9 @@ impl Trial {
         (0..self.cases).filter(lacks).collect()
     }
 
-    fn sum_up(&self, scores: &[CaseScore]) -> Result<Summary, TrialError> {
-        let makings: Vec<Making> = (0..self.cases).map(|number| self.plan(number).making).collect();
+    /// Writes the tables of these cases; one without a score is a failed diagnosis.
+    fn sum_up(&self, scores: &[CaseScore], numbers: &[u32]) -> Result<Summary, TrialError> {
+        let makings: Vec<Making> = numbers.iter().map(|&number| self.plan(number).making).collect();
         let summary = Summary::new(&makings, scores);
         let line = |score| serde_json::to_string(score).expect("plain data is plain JSON") + "\n";
         let lines: String = scores.iter().map(line).collect();
@@ -208,10 +213,14 @@ impl Trial {
             Preset::VTrack => (String::new(), ""),
             line => (format!(" {},", line.name()), ONE_SIMULATOR),
         };
+        let cases = if numbers.len() < self.cases as usize {
+            format!("{} of {} cases so far", numbers.len(), self.cases)
+        } else {
+            format!("{} cases", self.cases)
+        };
         let tables = format!(
-            "Trial of{track} seed {}, {} cases, version {CODE_VERSION}.{remark}\n\n{}",
+            "Trial of{track} seed {}, {cases}, version {CODE_VERSION}.{remark}\n\n{}",
             self.seed,
-            self.cases,
             summary.to_markdown(scores)
         );
         let mut output = Output::begin(&self.folder, Kind::Trial, self.force)?;

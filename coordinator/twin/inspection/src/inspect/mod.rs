@@ -361,19 +361,19 @@ fn is_longer_than(order: &Order, flat: &Flat) -> bool {
     flat.circumference_m.0 / order.number as f64 > 4.0 * length
 }
 
-/// Stretches `[from, to]` in m around blows that occur at one place at every speed, in one pass or more: an
-/// impact of the rail is looked for in the mean power of the passes at a speed. `speeds` are the indices of
-/// their passes.
+/// Stretches `[from, to]` in m within reach of a blow at every speed, in one pass or more: an impact of the rail is
+/// looked for in the mean power of the passes at a speed. `speeds` are the indices of their passes.
 fn common_places(blows_m: &[Vec<f64>], speeds: &[Vec<usize>], reach_m: f64) -> Vec<[f64; 2]> {
-    let Some((first, others)) = speeds.split_first() else { return Vec::new() };
-    let blows_at = |speed: &Vec<usize>| -> Vec<f64> {
-        speed.iter().flat_map(|&pass| blows_m[pass].iter().copied()).collect()
+    let around = |speed: &Vec<usize>| -> Vec<[f64; 2]> {
+        let blows = speed.iter().flat_map(|&pass| blows_m[pass].iter());
+        blows.map(|blow| [blow - reach_m, blow + reach_m]).collect()
     };
-    let others: Vec<Vec<f64>> = others.iter().map(blows_at).collect();
-    let met =
-        |x: f64| others.iter().all(|speed| speed.iter().any(|other| (other - x).abs() < reach_m));
-    let common = blows_at(first).into_iter().filter(|x| met(*x));
-    common.map(|x| [x - reach_m, x + reach_m]).collect()
+    let in_both = |known: Vec<[f64; 2]>, further: Vec<[f64; 2]>| {
+        let pairs = known.iter().flat_map(|one| further.iter().map(move |other| (one, other)));
+        let overlaps = pairs.map(|(one, other)| [one[0].max(other[0]), one[1].min(other[1])]);
+        overlaps.filter(|[from_m, to_m]| from_m < to_m).collect()
+    };
+    speeds.iter().map(around).reduce(in_both).unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -150,6 +150,10 @@ fn a_place_is_common_if_some_pass_of_every_speed_has_a_blow_there() {
     assert_eq!(found.len(), 1);
     assert!(found[0][0] < 0.7 && 0.7 < found[0][1], "{found:?}");
     assert!(of(&[vec![0], vec![1], vec![2]]).is_empty());
+    // Between the blows of all speeds, not only around one of them.
+    let apart_m = [vec![0.914], vec![0.974], vec![0.954]];
+    let [from_m, to_m] = common_places(&apart_m, &[vec![0], vec![1], vec![2]], 0.05)[0];
+    assert!((from_m - 0.924).abs() < 1e-9 && (to_m - 0.964).abs() < 1e-9);
 }
 
 #[test]
