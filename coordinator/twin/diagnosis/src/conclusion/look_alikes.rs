@@ -82,7 +82,8 @@ pub(super) fn add_wheel_mode(hypotheses: &mut Vec<Hypothesis>) {
 
 /// Divides the probability of an accepted layer under a single sleeper between it and a mass on a spring elsewhere
 /// in the track, which no kind describes: an absorber on the rail has the same signature. A subgrade does not change
-/// from one sleeper to the next, so that the unknown element comes first; the layer stays in the model.
+/// from one sleeper to the next, so that the unknown element comes first; the layer stays in the model. A weaker effect
+/// that was found at this sleeper beside the layer is not more certain than it.
 pub(super) fn add_resonator(hypotheses: &mut Vec<Hypothesis>, unknown_max: f64) {
     let is_single = |it: &Hypothesis| {
         let sleepers = it.location.as_ref().map_or(0, |place| place.sleepers.len());
@@ -94,6 +95,13 @@ pub(super) fn add_resonator(hypotheses: &mut Vec<Hypothesis>, unknown_max: f64) 
         unknown.probability = unknown.probability.min(unknown_max);
         added.push(unknown);
         layer.probability *= 1.0 - NAMED_SHARE;
+    }
+    let layers: Vec<Hypothesis> = hypotheses.iter().filter(|it| is_single(it)).cloned().collect();
+    for other in hypotheses.iter_mut().filter(|it| it.accepted && !is_single(it)) {
+        let beside = layers.iter().filter(|layer| {
+            other.location == layer.location && other.log_evidence < layer.log_evidence
+        });
+        other.probability = beside.fold(other.probability, |most, it| most.min(it.probability));
     }
     hypotheses.extend(added);
 }
@@ -194,6 +202,13 @@ mod tests {
         assert!((layer_again.probability - 0.336).abs() < 1e-9 && layer_again.accepted);
         assert_eq!(unknown.physics, UNKNOWN);
         assert_eq!(unknown.family, layer_again.family);
+        let bolt = Hypothesis { log_evidence: 40.0, ..layer(&["SN8"]) };
+        let bolt = Hypothesis { physics: "sleeper_bolt".to_owned(), ..bolt };
+        let elsewhere = Hypothesis { location: layer(&["SN9"]).location, ..bolt.clone() };
+        let strong = Hypothesis { log_evidence: 170.0, ..layer(&["SN8"]) };
+        let mut beside = vec![bolt, elsewhere, strong];
+        add_resonator(&mut beside, 0.97);
+        assert!((beside[0].probability - 0.336).abs() < 1e-9 && beside[1].probability == 0.96);
         let mut run = vec![layer(&["SN8", "SN9"])];
         add_resonator(&mut run, 0.97);
         assert_eq!(run.len(), 1);

@@ -1,7 +1,6 @@
 //! Fits of candidates together with the baseline, and new fits of the baseline from their results.
 
 use super::holes::with_holes;
-use super::threshold::first_evidence;
 use super::{Fitted, Stage};
 use crate::calibration::{Calibration, CalibrationError, Descent, Problem};
 use crate::candidate::Candidate;
@@ -136,37 +135,6 @@ fn on_other_sleepers(problem: &Problem<'_>, current: &Calibration, mut fitted: F
         fitted.calibration = fitted.calibration.beside(&best);
     }
     fitted
-}
-
-/// Fits candidates that act on all sleepers, and lost against the one that was accepted, beside it from the track that
-/// they had alone: the accepted one's track imitates them. `earlier` are the fits of the search before.
-pub(super) fn beside_the_accepted(
-    problem: &Problem<'_>,
-    current: &Calibration,
-    earlier: &[Fitted],
-) -> Vec<Fitted> {
-    let lost = |fitted: &&Fitted| {
-        let Fitted { candidate, log_evidence, .. } = fitted;
-        candidate.is_everywhere()
-            && candidate.kind.place == PlaceKind::Sleepers
-            && *log_evidence >= first_evidence()
-            && problem.candidates.iter().all(|it| it.kind.physics != candidate.kind.physics)
-    };
-    let unknowns = problem.forward.unknowns.count();
-    let again = |fitted: &Fitted| -> Result<Fitted, CalibrationError> {
-        let Fitted { candidate, calibration, .. } = fitted;
-        let candidates = [problem.candidates, std::slice::from_ref(candidate)].concat();
-        let with = Problem { candidates: &candidates, ..*problem };
-        let alone = calibration.values.as_slice();
-        let start = alone[..unknowns].iter().chain(&current.values.as_slice()[unknowns..]);
-        let start = start.chain(&alone[alone.len() - candidate.free.len()..]);
-        let start =
-            DVector::from_iterator(current.values.len() + candidate.free.len(), start.copied());
-        let calibration = with.calibrate_in_range(start)?;
-        let log_evidence = log_evidence(candidate, &calibration, current);
-        Ok(Fitted { calibration, log_evidence, ..fitted.clone() })
-    };
-    earlier.iter().filter(lost).filter_map(|fitted| again(fitted).ok()).collect()
 }
 
 /// Log ratio of the evidence of a candidate's fit to the model without it, in nats, less what the choice of its

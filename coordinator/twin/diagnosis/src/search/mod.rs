@@ -24,7 +24,7 @@ pub(crate) use extent::Extent;
 pub(crate) use limits::HELD_OUT_MIN;
 pub(crate) use probability::{EVIDENCE_TEMPERING, Probabilities};
 
-use self::fit::{beside_the_accepted, retuned, with_earlier};
+use self::fit::{retuned, with_earlier};
 use self::limits::FALSE_ALARM;
 use self::round::{Setting, accepted_candidate, unknown_is_predicted};
 use self::threshold::EvidenceThreshold;
@@ -293,10 +293,6 @@ impl SearchOutcome {
                 setting.round(&problem, &self.last, all, threshold, &hopeless, progress)?;
             let lost = self.last.log_evidence - before.log_evidence;
             round.fitted = with_earlier(round.fitted, earlier, lost);
-        }
-        if let Some(before) = self.rounds.last().filter(|_| !round.fitted.is_empty()) {
-            let beside = beside_the_accepted(&problem, &self.last, &before.fitted);
-            round.fitted = with_earlier(round.fitted, beside, 0.0);
         }
         let competitor = self.competing_unknown(&round, &ports, &forward.section);
         if let Some(best) =
