@@ -216,9 +216,12 @@ pub struct Location {
     pub sleepers: Vec<String>,
 }
 
-/// Whether two locations share a sleeper; `None` is everywhere.
+/// Whether two locations share a sleeper, or a place away from all sleepers; `None` is everywhere.
 pub(crate) fn meet(one: Option<&Location>, other: Option<&Location>) -> bool {
     let (Some(one), Some(other)) = (one, other) else { return true };
+    if one.sleepers.is_empty() && other.sleepers.is_empty() {
+        return one.x_m[0] <= other.x_m[1] && other.x_m[0] <= one.x_m[1];
+    }
     one.sleepers.iter().any(|sleeper| other.sleepers.contains(sleeper))
 }
 

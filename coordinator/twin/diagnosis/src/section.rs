@@ -177,11 +177,15 @@ impl Section {
         placed
     }
 
+    /// Whether so many of the compared sleepers are three in four or more.
+    pub(crate) const fn are_most(&self, sleepers: usize) -> bool {
+        4 * sleepers >= 3 * self.sleepers()
+    }
+
     /// Indices in the whole track of the sleepers at which an effect acts, from those of the compared ones.
     fn acting(&self, numbers: &[usize]) -> Vec<usize> {
         let last = self.sleepers() - 1;
-        let goes_on = 4 * numbers.len() >= 3 * self.sleepers();
-        let at = |end: usize| goes_on && numbers.contains(&end);
+        let at = |end: usize| self.are_most(numbers.len()) && numbers.contains(&end);
         let before = if at(0) { 0..self.in_track(0) } else { 0..0 };
         let behind = if at(last) { self.in_track(last) + 1..self.spans() - 1 } else { 0..0 };
         before.chain(numbers.iter().map(|&number| self.in_track(number))).chain(behind).collect()

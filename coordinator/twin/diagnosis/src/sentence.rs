@@ -129,7 +129,9 @@ fn place(hypothesis: &Hypothesis, sleepers: &[String]) -> String {
     match &hypothesis.location {
         Some(location) if location.sleepers.len() <= NAMED_MAX => {
             let middle_m = 0.5 * (location.x_m[0] + location.x_m[1]);
-            format!("at {}, {middle_m:.2} m: ", location.sleepers.join(" and "))
+            let ids = location.sleepers.join(" and ");
+            let near = if ids.is_empty() { ids } else { ids + ", " };
+            format!("at {near}{middle_m:.2} m: ")
         }
         Some(location) if is_stretch(&hypothesis.physics) => {
             format!("from {:.2} to {:.2} m: ", location.x_m[0], location.x_m[1])
@@ -338,6 +340,10 @@ mod tests {
         ));
         let structure = Hypothesis { family: Some("unknown_structure".to_owned()), ..absorber };
         assert!(named(&structure, &track()).contains("lacks; it acts"));
+        let away = Location { x_m: [4.5, 4.6], sleepers: Vec::new() };
+        assert!(meet(Some(&away), Some(&Location { x_m: [4.55, 4.7], ..away.clone() })));
+        let beyond = Hypothesis { location: Some(away), ..structure.clone() };
+        assert!(named(&beyond, &track()).starts_with("at 4.55 m: something"));
         let everywhere = Hypothesis { location: None, behaviour: None, ..structure };
         assert_eq!(
             named(&everywhere, &track()),

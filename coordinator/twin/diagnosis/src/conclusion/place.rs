@@ -47,14 +47,16 @@ impl Evidence<'_> {
         }
     }
 
-    /// A stretch in m, with the sleepers of the recording that are at most half a spacing away, or the nearest one.
+    /// A stretch in m, with the sleepers of the recording that are at most half a spacing away, or the nearest one within
+    /// a spacing.
     pub(super) fn location_between(&self, from_m: f64, to_m: f64) -> Location {
         let half_m = (0.5 + PLACE_ERROR) * self.recording.spacing_m;
         let beyond_m = |it: &&Sleeper| (from_m - it.x_m).max(it.x_m - to_m).max(0.0);
         let all = || self.recording.sleepers.iter();
         let mut near: Vec<&Sleeper> = all().filter(|it| beyond_m(it) <= half_m).collect();
         if near.is_empty() {
-            near.extend(all().min_by(|a, b| beyond_m(a).total_cmp(&beyond_m(b))));
+            let nearest = all().min_by(|a, b| beyond_m(a).total_cmp(&beyond_m(b)));
+            near.extend(nearest.filter(|it| beyond_m(it) <= self.recording.spacing_m));
         }
         let sleepers = near.into_iter().map(|sleeper| sleeper.id.clone()).collect();
         Location { x_m: [from_m, to_m], sleepers }

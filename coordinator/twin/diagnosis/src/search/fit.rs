@@ -78,7 +78,8 @@ pub(super) fn fit(
         .collect();
     fitted.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
     let mut fitted = all_along(problem, current, once_each(fitted));
-    fitted.extend(with_holes(problem, current, &fitted));
+    let holed = with_holes(problem, current, &fitted);
+    fitted.extend(all_along(problem, current, holed));
     fitted.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
     to_the_end(problem, current, fitted)
 }
@@ -96,16 +97,20 @@ pub(super) fn with_earlier(fitted: Vec<Fitted>, earlier: Vec<Fitted>, lost: f64)
     once_each(all)
 }
 
-/// Repeats the fits of the best candidate and of its competitors, as far as they act on all sleepers, from
-/// softer and from stiffer sleepers: bending stiffness of the sleepers and what holds all of them can
+/// Repeats the fits of the best candidate and of its competitors, as far as they act on all or most sleepers,
+/// from softer and from stiffer sleepers: bending stiffness of the sleepers and what holds them can
 /// replace each other, and the fits have two minima.
 fn all_along(problem: &Problem<'_>, current: &Calibration, fitted: Vec<Fitted>) -> Vec<Fitted> {
     let Some(best) = fitted.first() else { return fitted };
     let least = RIVAL_SHARE * best.log_evidence;
     let again = |fitted: Fitted| {
         let candidate = &fitted.candidate;
-        let acts_on_all = candidate.is_everywhere() && candidate.kind.place == PlaceKind::Sleepers;
-        if acts_on_all && fitted.log_evidence >= least {
+        let sleepers = candidate.extension.sleepers.as_ref();
+        let is_on_most = sleepers.is_none_or(|it| problem.forward.section.are_most(it.len()));
+        let acts_on_most = candidate.extension.x_m.is_none()
+            && is_on_most
+            && candidate.kind.place == PlaceKind::Sleepers;
+        if acts_on_most && fitted.log_evidence >= least {
             on_other_sleepers(problem, current, fitted)
         } else {
             fitted
