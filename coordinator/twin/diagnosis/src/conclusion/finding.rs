@@ -124,12 +124,12 @@ fn take_wavelength(known: &mut Hypothesis, finding: &Finding) {
     }
 }
 
-/// Whether a hypothesis is the same under all sleepers of a section. It explains no shape at one place.
+/// Whether a hypothesis is the same under three in four of a section's sleepers or more. It explains no shape at one place.
 fn is_even(known: &Hypothesis, sleepers: usize) -> bool {
     let acts_on_sleepers =
         Kind::from_name(&known.physics).is_some_and(|kind| kind.place == PlaceKind::Sleepers);
-    let is_everywhere = known.location.as_ref().is_none_or(|it| it.sleepers.len() == sleepers);
-    acts_on_sleepers && is_everywhere
+    let is_on_most = known.location.as_ref().is_none_or(|it| 4 * it.sleepers.len() >= 3 * sleepers);
+    acts_on_sleepers && is_on_most
 }
 
 /// Whether an accepted extension explains a finding of this kind at a location. It explains neither a
