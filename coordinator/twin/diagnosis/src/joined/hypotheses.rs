@@ -143,8 +143,8 @@ fn mean_of_one_form(one: Estimate, other: Estimate, form: f64) -> Estimate {
 }
 
 /// Mean of two estimates. Where they differ by more than their deviations, both are weighted with the variance between
-/// them as well (DerSimonian & Laird 1986, Controlled Clinical Trials 7, random effects): a wrong one that is sure of
-/// itself does not win.
+/// them as well: a wrong one that is sure of itself does not win (random effects, `DerSimonian` & Laird 1986, Controlled
+/// Clinical Trials 7).
 pub(super) fn mean(one: Estimate, other: Estimate) -> Estimate {
     // An exact value, such as the number of an order, stays.
     if let Some(exact) = [one, other].into_iter().find(|it| it.sd == 0.0) {
