@@ -177,15 +177,10 @@ impl Section {
         placed
     }
 
-    /// Whether so many of the compared sleepers are three in four or more.
-    pub(crate) const fn are_most(&self, sleepers: usize) -> bool {
-        4 * sleepers >= 3 * self.sleepers()
-    }
-
     /// Indices in the whole track of the sleepers at which an effect acts, from those of the compared ones.
     fn acting(&self, numbers: &[usize]) -> Vec<usize> {
         let last = self.sleepers() - 1;
-        let at = |end: usize| self.are_most(numbers.len()) && numbers.contains(&end);
+        let at = |end: usize| are_most(numbers.len(), self.sleepers()) && numbers.contains(&end);
         let before = if at(0) { 0..self.in_track(0) } else { 0..0 };
         let behind = if at(last) { self.in_track(last) + 1..self.spans() - 1 } else { 0..0 };
         before.chain(numbers.iter().map(|&number| self.in_track(number))).chain(behind).collect()
@@ -221,6 +216,11 @@ impl Section {
         };
         (0..self.sleepers()).map(of).collect()
     }
+}
+
+/// Whether some of all sleepers are three in four or more.
+pub(crate) const fn are_most(some: usize, all: usize) -> bool {
+    4 * some >= 3 * all
 }
 
 #[cfg(test)]

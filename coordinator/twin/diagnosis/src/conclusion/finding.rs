@@ -3,6 +3,7 @@
 use super::{Evidence, FAILED_SHARE, NAMED_SHARE, names};
 use crate::estimate::Estimate;
 use crate::outcome::{Hypothesis, Location, UNKNOWN, meet};
+use crate::section::are_most;
 use std::collections::BTreeMap;
 use tracktwin_inspection::Finding;
 use tracktwin_track::extension::{Class, Kind, LookAlikeGroup, PlaceKind};
@@ -128,7 +129,7 @@ fn take_wavelength(known: &mut Hypothesis, finding: &Finding) {
 fn is_even(known: &Hypothesis, sleepers: usize) -> bool {
     let acts_on_sleepers =
         Kind::from_name(&known.physics).is_some_and(|kind| kind.place == PlaceKind::Sleepers);
-    let is_on_most = known.location.as_ref().is_none_or(|it| 4 * it.sleepers.len() >= 3 * sleepers);
+    let is_on_most = known.location.as_ref().is_none_or(|it| are_most(it.sleepers.len(), sleepers));
     acts_on_sleepers && is_on_most
 }
 

@@ -5,6 +5,7 @@ use super::{Fitted, Stage};
 use crate::calibration::{Calibration, CalibrationError, Descent, Problem};
 use crate::candidate::Candidate;
 use crate::screen::Template;
+use crate::section::are_most;
 use nalgebra::DVector;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -106,7 +107,8 @@ fn all_along(problem: &Problem<'_>, current: &Calibration, fitted: Vec<Fitted>) 
     let again = |fitted: Fitted| {
         let candidate = &fitted.candidate;
         let sleepers = candidate.extension.sleepers.as_ref();
-        let is_on_most = sleepers.is_none_or(|it| problem.forward.section.are_most(it.len()));
+        let all = problem.forward.section.sleepers();
+        let is_on_most = sleepers.is_none_or(|it| are_most(it.len(), all));
         let acts_on_most = candidate.extension.x_m.is_none()
             && is_on_most
             && candidate.kind.place == PlaceKind::Sleepers;

@@ -95,33 +95,21 @@ impl Holes<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bands::Bands;
     use crate::candidate::candidates;
-    use crate::forward::Forward;
-    use crate::observation::Observation;
-    use crate::section::Section;
-    use nalgebra::DMatrix;
-    use tracktwin_parameters::TrackDesign;
+    use crate::search::testing::observed;
     use tracktwin_track::extension::ExtensionInstance;
 
     const BOLT_N_M: f64 = 3e7;
 
     /// Sleepers with bolts as found on a track with bolts at these; `None` where no hole is found.
     fn found(bolted: &[usize]) -> Option<Vec<usize>> {
-        let section = Section::new(TrackDesign::v_track(), 10, 1.0);
-        let forward = Forward::new(section, Bands::new(100.0, 3300.0), &[7.0, 13.0], vec![0.0; 2]);
-        let section = &forward.section;
-        let typical = forward.unknowns.typical();
         let bolts = ExtensionInstance::new("sleeper_bolt").on(bolted.iter().copied());
-        let bolts = section.in_model(&bolts.with("stiffness_N_per_m", BOLT_N_M));
-        let bolts = bolts.build(&section.track.design, section.spans()).unwrap();
-        let log_power = forward.log_power(&typical, &[bolts]).unwrap();
-        let covariance = 0.02 * DMatrix::identity(forward.per_sleeper(), forward.per_sleeper());
-        let observation = Observation::new(log_power, &covariance, |_| false).unwrap();
+        let (forward, observation) = observed(10, &bolts.with("stiffness_N_per_m", BOLT_N_M));
+        let typical = forward.unknowns.typical();
         let plain = Problem { forward: &forward, observation: &observation, candidates: &[] };
         let current = plain.at(&typical).unwrap();
 
-        let all = candidates(section);
+        let all = candidates(&forward.section);
         let are_everywhere = |candidate: &&Candidate| {
             candidate.kind.physics == "sleeper_bolt" && candidate.is_everywhere()
         };

@@ -168,9 +168,8 @@ mod tests {
     use crate::calibration::Calibration;
     use crate::candidate::candidates;
     use crate::forward::Forward;
-    use crate::observation::Observation;
+    use crate::search::testing::observed;
     use crate::section::Section;
-    use nalgebra::DMatrix;
     use tracktwin_parameters::TrackDesign;
     use tracktwin_track::extension::ExtensionInstance;
 
@@ -223,16 +222,10 @@ mod tests {
 
     #[test]
     fn bolts_are_tried_on_usual_railpads_where_soft_ones_imitate_them() {
-        let forward = forward();
+        let bolts = ExtensionInstance::new("sleeper_bolt").on([4, 5]);
+        let (forward, observation) = observed(10, &bolts.with("stiffness_N_per_m", 4.5e7));
         let all = candidates(&forward.section);
         let typical = forward.unknowns.typical();
-        let section = &forward.section;
-        let bolts = ExtensionInstance::new("sleeper_bolt").on([4, 5]);
-        let bolts = section.in_model(&bolts.with("stiffness_N_per_m", 4.5e7));
-        let bolts = bolts.build(&section.track.design, section.spans()).unwrap();
-        let log_power = forward.log_power(&typical, &[bolts]).unwrap();
-        let covariance = 0.02 * DMatrix::identity(forward.per_sleeper(), forward.per_sleeper());
-        let observation = Observation::new(log_power, &covariance, |_| false).unwrap();
         let problem = Problem { forward: &forward, observation: &observation, candidates: &[] };
 
         let outlier_starts = |current: &Calibration| {

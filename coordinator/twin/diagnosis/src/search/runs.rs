@@ -105,7 +105,8 @@ impl Singles<'_> {
             });
             let further = with.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|it| it.0 > best);
             let Some((gain, sleeper)) = further else { break };
-            (best, chosen) = (gain, [&chosen[..], &[sleeper]].concat());
+            best = gain;
+            chosen.push(sleeper);
             sum.add(self.templates[&sleeper]);
         }
         chosen.sort_unstable();
@@ -179,33 +180,22 @@ impl Sum {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bands::Bands;
     use crate::calibration::Problem;
     use crate::candidate::candidates;
-    use crate::forward::Forward;
-    use crate::observation::Observation;
     use crate::screen::templates;
-    use crate::section::Section;
-    use nalgebra::DMatrix;
-    use tracktwin_parameters::TrackDesign;
+    use crate::search::testing::observed;
     use tracktwin_track::extension::ExtensionInstance;
 
     /// Sleepers of the candidate with clamps that is found on a track with clamps at these; `None` without any.
     fn clamps_found(clamped: &[usize]) -> Option<Vec<usize>> {
-        let section = Section::new(TrackDesign::v_track(), 16, 1.0);
-        let forward = Forward::new(section, Bands::new(100.0, 3300.0), &[7.0, 13.0], vec![0.0; 2]);
-        let section = &forward.section;
-        let typical = forward.unknowns.typical();
         let clamps = ExtensionInstance::new("fastening_clamp").on(clamped.iter().copied());
         let clamps = clamps.with("vertical_N_per_m", 5e7).with("rotational_N_m_per_rad", 3e5);
-        let clamps = section.in_model(&clamps).build(&section.track.design, section.spans());
-        let log_power = forward.log_power(&typical, &[clamps.unwrap()]).unwrap();
-        let covariance = 0.02 * DMatrix::identity(forward.per_sleeper(), forward.per_sleeper());
-        let observation = Observation::new(log_power, &covariance, |_| false).unwrap();
+        let (forward, observation) = observed(16, &clamps);
         let problem = Problem { forward: &forward, observation: &observation, candidates: &[] };
-        let current = problem.calibrate(typical).unwrap();
+        let current = problem.calibrate(forward.unknowns.typical()).unwrap();
         let is_clamp = |candidate: &Candidate| candidate.kind.physics == "fastening_clamp";
-        let all: Vec<Candidate> = candidates(section).into_iter().filter(is_clamp).collect();
+        let all: Vec<Candidate> =
+            candidates(&forward.section).into_iter().filter(is_clamp).collect();
         let templates = templates(&problem, &current, &all, &|| ()).unwrap();
         let found = runs(&templates, &all, &current).pop()?;
         assert!(found.choice_nats > 0.0);
