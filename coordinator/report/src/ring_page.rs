@@ -45,7 +45,7 @@ fn summary(study: &Study, statements: &[Statement]) -> String {
 }
 
 fn table(statements: &[Statement]) -> Markup {
-    let wrapped = "white-space:normal;vertical-align:top;min-width:9rem";
+    let wrapped = "white-space:normal;vertical-align:top;min-width:7rem";
     html! {
         table {
             thead { tr {

@@ -66,11 +66,11 @@ fn error(study: &Study, estimated: &Estimated, parameter: Parameter) -> Option<F
     let median_error = median(errors.iter().map(|error| error.abs()))?;
     let bias = median(errors.iter().copied())?;
     let text = format!(
-        "{} at {} of {} sleepers; median of the error {}",
+        "median error of the logarithm {}, with its sign {}, at {} of {} sleepers",
         rounded(median_error, 2),
+        rounded(bias, 2),
         errors.len(),
-        study.truth.sleepers.len(),
-        rounded(bias, 2)
+        study.truth.sleepers.len()
     );
     Some(Found::new(median_error <= ERROR, text))
 }
@@ -123,7 +123,11 @@ mod tests {
         let truth = estimated(&study, |_, _, truth| (truth, 0.1 * truth));
         let all = statements(&study, Method::Inversion, &truth);
         assert!(all.iter().all(|it| it.verdict == ClaimVerdict::Reproduced), "{all:#?}");
-        assert!(all[0].found.starts_with("0 at 100 of 100"), "{}", all[0].found);
+        assert!(
+            all[0].found.ends_with("0, with its sign 0, at 100 of 100 sleepers"),
+            "{}",
+            all[0].found
+        );
     }
 
     #[test]

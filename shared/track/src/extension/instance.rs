@@ -82,6 +82,19 @@ pub enum InstanceError {
         /// Name of the kind.
         physics: String,
     },
+    /// The place has a sleeper that the track lacks.
+    #[error(
+        "{physics}: the track has no sleeper SN{}; it has SN1 to SN{sleepers} (in files 0 to {})",
+        .index + 1, .sleepers.saturating_sub(1)
+    )]
+    NoSleeper {
+        /// Name of the kind.
+        physics: String,
+        /// Index of the sleeper, from 0.
+        index: usize,
+        /// Number of sleepers of the track.
+        sleepers: usize,
+    },
     /// The place is missing, has another [`PlaceKind`] than the kind requires, or is not on the track.
     #[error(
         "{physics}: its place must be {form}, on the track of {length_m} m and {sleepers} sleepers"
@@ -274,10 +287,8 @@ impl Inputs<'_> {
     fn check_place(&self) -> Result<(), InstanceError> {
         let (x_m, sleepers) = (self.instance.x_m, self.instance.sleepers.as_deref());
         let on_track = |[from, to]: [f64; 2]| 0.0 <= from && from <= to && to <= self.length_m();
-        let standing = |numbers: &[usize]| {
-            let ascending = numbers.is_sorted_by(|one, next| one < next);
-            ascending && numbers.last().is_some_and(|&last| last < self.sleeper_count())
-        };
+        let ascending =
+            |indices: &[usize]| !indices.is_empty() && indices.is_sorted_by(|one, next| one < next);
         let fits = match self.kind.place {
             PlaceKind::Nowhere => x_m.is_none() && sleepers.is_none(),
             // A diagnosis may say beside the point which sleepers are near it.
@@ -285,17 +296,21 @@ impl Inputs<'_> {
             PlaceKind::Stretch => {
                 sleepers.is_none() && x_m.is_none_or(|[from, to]| from < to && on_track([from, to]))
             }
-            PlaceKind::Sleepers => x_m.is_none() && sleepers.is_none_or(standing),
+            PlaceKind::Sleepers => x_m.is_none() && sleepers.is_none_or(ascending),
         };
-        if fits {
-            return Ok(());
+        let physics = self.kind.physics.to_owned();
+        let count = self.sleeper_count();
+        if !fits {
+            let (form, length_m) = (self.kind.place.form(), self.length_m());
+            return Err(InstanceError::Place { physics, form, length_m, sleepers: count });
         }
-        Err(InstanceError::Place {
-            physics: self.kind.physics.to_owned(),
-            form: self.kind.place.form(),
-            length_m: self.length_m(),
-            sleepers: self.sleeper_count(),
-        })
+        let is_of_sleepers = self.kind.place == PlaceKind::Sleepers;
+        match sleepers.and_then(|indices| indices.iter().find(|&&index| index >= count)) {
+            Some(&index) if is_of_sleepers => {
+                Err(InstanceError::NoSleeper { physics, index, sleepers: count })
+            }
+            _ => Ok(()),
+        }
     }
 }
 

@@ -188,7 +188,8 @@ mod tests {
         assert!(refusal(bolt.clone().with("stiffness", 1.0)).contains("has no parameter"));
         let bolt = bolt.with("stiffness_N_per_m", 1e7);
         assert!(refusal(bolt.clone().with("stiffness_N_per_m", -1.0)).contains("more than zero"));
-        assert!(refusal(bolt.on([11])).contains("sleepers = [numbers, ascending]"));
+        assert!(refusal(bolt.clone().on([3, 2])).contains("sleepers = [numbers, ascending]"));
+        assert!(refusal(bolt.on([11])).contains("no sleeper SN12; it has SN1 to SN11 "));
         let joint = ExtensionInstance::new("rail_joint").with("dip_m", 1e-4);
         assert!(refusal(joint.clone()).contains("a point of the rail"));
         assert!(refusal(joint.at([1.6, 1.6])).contains("track of 1.5 m"));
