@@ -114,6 +114,7 @@ pub async fn diagnose(
     let surfaces = f64::from(null_models::SURFACES);
     let share = |done| watch("null model", done as f64 / surfaces);
     let null = null_models::of(&prepared, &start, library, share).await?;
+    prepared.forward.expect_offset(&null.offset());
     let start = compute(|| prepared.learn_railpad_damping(&null, start))
         .map_err(DiagnosingError::Baseline)?;
     let mut all = tracktwin_diagnosis::candidates(&prepared.forward.section);

@@ -62,12 +62,13 @@ pub async fn invert(
         (prepared, known.unwrap_or_default())
     };
     let prepared = prepared.into_iter().map(with_physics).collect();
-    let started = compute(|| start(prepared, watch))?;
+    let mut started = compute(|| start(prepared, watch))?;
     let Started { prepared, values, .. } = &started[started.len() / 2];
     watch("null model", 0.0);
     let surfaces = f64::from(null_models::SURFACES);
     let share = |done| watch("null model", done as f64 / surfaces);
     let null = null_models::of(prepared, values, library, share).await?;
+    started.iter_mut().for_each(|it| it.prepared.forward.expect_offset(&null.offset()));
     watch("fit", 0.0);
     let count = started.len() as f64;
     let progress = |done| watch("fit", done as f64 / count);

@@ -68,6 +68,13 @@ pub(crate) fn gain(centre_hz: f64, frequency_hz: f64) -> f64 {
     (-0.5 * distance * distance).exp()
 }
 
+/// Density per Hz at a spectral line of a tone with power one. The two lines beside the tone share it.
+pub(crate) fn tone_density(line_hz: f64, tone_hz: f64) -> f64 {
+    let step = std::f64::consts::LN_2 / LINES_PER_OCTAVE;
+    let lines_apart = ((line_hz / tone_hz).ln() / step).abs();
+    (1.0 - lines_apart).max(0.0) / (step * line_hz)
+}
+
 fn weights(lines_hz: &[f64], centre_hz: f64) -> Vec<(usize, f64)> {
     // Lines have equal steps of the logarithm.
     let width = |line_hz: f64| line_hz * std::f64::consts::LN_2 / LINES_PER_OCTAVE;
@@ -90,5 +97,17 @@ mod tests {
             let expected = 2.0 * centre * std::f64::consts::PI.sqrt() / CENTRE_RAD;
             assert!((sum / expected - 1.0).abs() < 2e-3, "{centre}: {}", sum / expected);
         }
+    }
+
+    #[test]
+    fn a_tone_has_the_gain_of_its_band() {
+        let bands = Bands::new(100.0, 4000.0);
+        let (tone_hz, centre_hz) = (417.0, bands.centres_hz()[12]);
+        let line =
+            |&(line, weight): &(usize, f64)| weight * tone_density(bands.lines_hz()[line], tone_hz);
+        let power: f64 = bands.weights(12).iter().map(line).sum();
+        let expected = 2.0 * gain(centre_hz, tone_hz).powi(2);
+        // Lines stand 2 % apart, a seventh of the wavelet's width.
+        assert!((power / expected - 1.0).abs() < 0.02, "{power}, {expected}");
     }
 }

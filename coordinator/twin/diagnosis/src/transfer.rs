@@ -1,7 +1,7 @@
 //! Transfer from the surface under the wheel to the recorded acceleration.
 
 use crate::further_wheels::FurtherWheels;
-use crate::profile::{Shape, WheelTurns};
+use crate::profile::{Shape, Tone, WheelTurns};
 use crate::section::{Section, Window};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -172,8 +172,16 @@ impl Transfer {
     pub(crate) fn with_shapes(mut self, section: &Section, turns: &WheelTurns) -> Self {
         let model = &self.model;
         let rolled_m = |x_m: f64, start_m: f64| (x_m - start_m) / turns.circumference_ratio;
+        let circumference_m = TAU * section.track.design.wheel.radius_m;
+        let tones = Tone::of_wheel(circumference_m * turns.circumference_ratio, |turn| {
+            model.wheel_profile_m(turn * circumference_m)
+        });
         let of_pass = |&start_m: &f64| {
-            Shape::new(section, None, |x_m| model.wheel_profile_m(rolled_m(x_m, start_m)))
+            if tones.is_empty() {
+                Shape::new(section, None, |x_m| model.wheel_profile_m(rolled_m(x_m, start_m)))
+            } else {
+                Some(Shape::of_tones(section, &tones))
+            }
         };
         let of_speed = |starts: &Vec<f64>| starts.iter().map(of_pass).collect();
         let wheel = turns.starts_m.iter().map(of_speed).collect::<Option<_>>().unwrap_or_default();

@@ -10,7 +10,7 @@ const SPOT: f64 = 1.0;
 
 impl Fitted {
     /// Version of the fit. Stored sections of another version are fitted again.
-    pub const VERSION: u32 = 7;
+    pub const VERSION: u32 = 8;
 
     /// The fit as numbers: values, deviations, misfits, variations, the deviation of the railpads' damping, the number
     /// of support changes, six numbers for each of them, and a pair for each exception.

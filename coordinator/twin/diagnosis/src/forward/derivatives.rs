@@ -187,7 +187,7 @@ impl Forward {
         let power = scale * self.power(transfer, &excitation[speed], (sleeper, speed, band));
         let floor = power + self.noise(speed, band);
         let shapes = self.shape_powers(transfer, sleeper, speed, band);
-        scale * mean(shapes, |shape| (floor + shape).recip())
+        scale * mean(shapes, |shape| self.per_random_power([floor, shape], speed, band))
     }
 
     /// Derivatives of each sleeper's dynamic stiffness under the rail with respect to the logarithms of
@@ -248,20 +248,19 @@ impl Forward {
             .enumerate()
             .map(|(column, index)| (index, self.beyond[(row, column)]));
         let log_power = self.response(values, band)
-            + mean(shapes.clone(), |shape| (floor + shape).ln())
+            + mean(shapes.clone(), |shape| self.mean_logarithm([floor, shape], speed, band))
             + beyond.clone().map(|(index, change)| values[index] * change).sum::<f64>();
-        // What a change of the random power is divided by.
-        let total = 1.0 / mean(shapes, |shape| (floor + shape).recip());
+        let per_power = mean(shapes, |shape| self.per_random_power([floor, shape], speed, band));
         let mut derivatives: Vec<_> =
-            spectrum.into_iter().map(|(knot, sum)| (knot, sum / total)).collect();
-        derivatives.push((unknowns.at(Own::Level, sleeper), power / total));
-        derivatives.push((unknowns.gain(speed), power / total));
+            spectrum.into_iter().map(|(knot, sum)| (knot, sum * per_power)).collect();
+        derivatives.push((unknowns.at(Own::Level, sleeper), power * per_power));
+        derivatives.push((unknowns.gain(speed), power * per_power));
         derivatives.extend(beyond);
         derivatives.extend(unknowns.response_shares(self.bands.centres_hz()[band]));
         for (in_track, compared) in self.near(sleeper) {
             let columns = VARIATIONS.map(|(quantity, _)| unknowns.of(quantity, compared));
             let changes = supports.at(in_track, sleeper, row % self.per_sleeper());
-            let changes = changes.map(|change| scale * change / total);
+            let changes = changes.map(|change| scale * change * per_power);
             derivatives.extend(columns.into_iter().zip(changes));
             let damping = unknowns.railpad_damping().start + compared;
             derivatives.push((damping, changes[RAILPAD_DAMPING]));

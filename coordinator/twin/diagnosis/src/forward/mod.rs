@@ -25,6 +25,10 @@ use std::sync::Arc;
 use tracktwin_track::extension::Extension;
 use tracktwin_track::model::{ModelError, Roughness, TrackModel};
 
+/// Mean logarithm of the power of one complex Gaussian amplitude over the logarithm of its mean: Euler's constant. No
+/// window has a lower one.
+const LOG_BIAS_MIN: f64 = -0.577_215_664_901_532_9;
+
 /// Forward model: predicts the log powers of a section as one vector in the order `[sleeper][speed][band]`.
 #[derive(Clone, Debug)]
 pub struct Forward {
@@ -40,6 +44,9 @@ pub struct Forward {
     pub noise_density: Vec<f64>,
     /// Turns of the wheel in every pass.
     pub wheel_turns: WheelTurns,
+    /// Mean logarithm of a random power over the logarithm of its mean, `[speed][band]`: the part of the null
+    /// model's offset that the power of a shape does not have. Zero before [`Forward::expect_offset`].
+    log_bias: Vec<f64>,
     /// Changes of the log powers from the track beyond the compared sleepers, one column for each unknown
     /// of [`Unknowns::beyond`]; zero before [`Forward::allow_beyond`].
     beyond: DMatrix<f64>,
@@ -72,7 +79,8 @@ impl Forward {
         let surface =
             speeds_m_s.iter().map(|&v| lines.iter().map(|&hz| density(v, hz)).collect()).collect();
         let wheel_turns = WheelTurns::default();
-        let rows = section.sleepers() * speeds_m_s.len() * bands.count();
+        let log_bias = vec![0.0; speeds_m_s.len() * bands.count()];
+        let rows = section.sleepers() * log_bias.len();
         let beyond = DMatrix::zeros(rows, unknowns.beyond().len());
         Self {
             section,
@@ -81,6 +89,7 @@ impl Forward {
             unknowns,
             noise_density,
             wheel_turns,
+            log_bias,
             beyond,
             windows,
             surface,
@@ -92,7 +101,15 @@ impl Forward {
     pub fn with_ends(&self, spans_beyond: usize) -> Self {
         let section = Section { spans_beyond, ..self.section.clone() };
         let speeds: Vec<f64> = self.speeds_m_s.iter().map(|speed| 3.6 * speed).collect();
-        Self::new(section, self.bands.clone(), &speeds, self.noise_density.clone())
+        let ended = Self::new(section, self.bands.clone(), &speeds, self.noise_density.clone());
+        Self { log_bias: self.log_bias.clone(), ..ended }
+    }
+
+    /// Makes predictions of shapes agree with data from which the null model's offset is subtracted. The mean logarithm
+    /// of a random power is lower than the logarithm of its mean; that of a shape's power is not. `offset` has one value
+    /// per speed and band.
+    pub fn expect_offset(&mut self, offset: &DVector<f64>) {
+        self.log_bias = offset.iter().map(|offset| offset.clamp(LOG_BIAS_MIN, 0.0)).collect();
     }
 
     /// Number of log powers.
@@ -137,7 +154,8 @@ impl Forward {
             let power = scale * self.power(transfer, &excitation[speed], (sleeper, speed, band));
             let floor = power + self.noise(speed, band);
             let shapes = self.shape_powers(transfer, sleeper, speed, band);
-            self.response(values, band) + mean(shapes, |shape| (floor + shape).ln())
+            let logarithm = |shape| self.mean_logarithm([floor, shape], speed, band);
+            self.response(values, band) + mean(shapes, logarithm)
         });
         let beyond = self.unknowns.beyond();
         let changes = self.beyond.rows(first, all.len());
@@ -296,6 +314,24 @@ impl Forward {
             return vec![rail];
         }
         wheel.iter().map(|wheel| rail + power(wheel, &own)).collect()
+    }
+
+    /// Mean logarithm of a random power plus the power of a shape, less the offset of the null model. With the share
+    /// s of the shape the random part of the logarithm is lower by the factor 1 - s²: for one complex Gaussian amplitude
+    /// beside a constant one, to within 0.05 of the largest bias.
+    fn mean_logarithm(&self, [random, shape]: [f64; 2], speed: usize, band: usize) -> f64 {
+        let share = shape / (random + shape);
+        (random + shape).ln() - self.log_bias(speed, band) * share * share
+    }
+
+    /// Derivative of [`Forward::mean_logarithm`] with respect to the random power.
+    fn per_random_power(&self, [random, shape]: [f64; 2], speed: usize, band: usize) -> f64 {
+        let share = shape / (random + shape);
+        (1.0 + 2.0 * self.log_bias(speed, band) * share * share) / (random + shape)
+    }
+
+    fn log_bias(&self, speed: usize, band: usize) -> f64 {
+        self.log_bias[speed * self.bands.count() + band]
     }
 
     /// Power spectral density of the surface in m2/Hz, at level one with the baseline's spectrum:
