@@ -33,7 +33,7 @@ pub(super) const KIND: Kind = Kind {
     would_separate: "passes with another wheel load: a void closes, soft ballast does not",
     screening: Screening::tried(&[
         // Gaps that close while the wheel is above the sleeper, or near it; and one that no load closes.
-        Family::new(Places::SleepersAndPairs, &["gap_m"], Trials::Grid(&[&[1e-4, 1.6e-4]])),
+        Family::new(Places::SleepersAndPairs, &["gap_m"], Trials::Grid(&[&[6e-5, 1e-4, 1.6e-4]])),
         Family::new(Places::SleepersAndPairs, &[], Trials::Grid(&[])).held(&[("gap_m", 4e-4)]),
         // Loose ballast under a sleeper that it does not carry still damps.
         Family::new(Places::SleepersAndPairs, &["damping_share"], Trials::Grid(&[&[0.15]]))
