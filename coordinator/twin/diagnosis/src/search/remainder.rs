@@ -2,11 +2,11 @@
 
 use super::extent::Extent;
 use super::limits::FALSE_ALARM;
-use super::threshold::is_local_shape;
 use super::{Round, SearchOutcome};
 use crate::candidate::Candidate;
 use crate::port_scan::{PortPlace, PortScan, UnknownElement};
 use crate::section::Section;
+use tracktwin_track::extension::Class;
 
 /// Share of a candidate's evidence from which unknown physics in the residual at its location leads to
 /// rejection; a correct candidate leaves hardly any residual.
@@ -71,20 +71,22 @@ impl SearchOutcome {
 }
 
 /// Smallest evidence in nats for unknown physics that leads to the rejection of the first of these
-/// candidates. The evidence of others of its kind at the same location is included. `None` for a shape,
-/// because the model does not include its phase relative to the surface.
+/// candidates. The evidence of others of its kind at the same location is included. `None` for a shape of rail
+/// or wheel, because the model does not include its phase relative to the surface.
 fn retraction_threshold(explained: &[(&Candidate, f64)]) -> Option<f64> {
     let &(last, _) = explained.first()?;
     let is_kind = |(known, _): &&(&Candidate, f64)| known.kind.physics == last.kind.physics;
     let evidence: f64 = explained.iter().take_while(is_kind).map(|(_, evidence)| evidence).sum();
     let share = if last.is_under_load() { LEFT_UNDER_LOAD } else { LEFT };
-    (!is_local_shape(last)).then_some((share * evidence).max(LEFT_MIN))
+    let is_shape = last.kind.classes.contains(&Class::Wavelength);
+    (!is_shape).then_some((share * evidence).max(LEFT_MIN))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::search::testing::section_with_candidates;
+    use tracktwin_track::extension::Kind;
 
     #[test]
     fn what_is_left_speaks_against_a_name_but_not_against_a_shape_or_two_of_a_kind() {
@@ -99,6 +101,8 @@ mod tests {
         assert_eq!(retraction_threshold(&[(pad, 300.0)]), Some(30.0));
         assert_eq!(retraction_threshold(&[(of("sensor_mount_resonance"), 900.0)]), Some(90.0));
         assert_eq!(retraction_threshold(&[(dip, 300.0)]), None);
+        let kind = Kind::from_name("wheel_out_of_round").unwrap();
+        assert_eq!(retraction_threshold(&[(&Candidate { kind, ..dip.clone() }, 300.0)]), None);
         assert_eq!(retraction_threshold(&[]), None);
     }
 }
