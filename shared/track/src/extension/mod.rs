@@ -46,9 +46,9 @@ pub use kind::{Class, EffectFamily, Kind, LookAlikeGroup, PlaceKind};
 pub use kind_parameter::{Bound, KindParameter};
 pub use measured::Measured;
 pub use registry::{
-    CLIPPING, CORRUGATION, CRACKED_SLEEPER, ELECTRICAL_HUM, FLEXIBLE_AXLE_BOX, GAIN_ERROR,
-    POSITION_ERROR, RAIL_JOINT, SENSOR_MOUNT_RESONANCE, SQUAT, SUBGRADE_LAYER, WHEEL_FLAT,
-    WHEEL_OUT_OF_ROUND,
+    CLIPPING, CORRUGATION, CRACKED_SLEEPER, ELECTRICAL_HUM, FASTENING_CLAMP, FLEXIBLE_AXLE_BOX,
+    GAIN_ERROR, POSITION_ERROR, RAIL_JOINT, SENSOR_MOUNT_RESONANCE, SQUAT, SUBGRADE_LAYER,
+    WHEEL_FLAT, WHEEL_OUT_OF_ROUND,
 };
 pub use sampled::{SampledExtension, SampledValue};
 pub use screening::{Family, Places, Screening, Trials};

@@ -52,6 +52,8 @@ pub static WHEEL_OUT_OF_ROUND: &Kind = &super::wheel_out_of_round::KIND;
 pub static CRACKED_SLEEPER: &Kind = &super::cracked_sleeper::KIND;
 /// Layer of subgrade.
 pub static SUBGRADE_LAYER: &Kind = &super::subgrade_layer::KIND;
+/// Clamps that hold the rail at some sleepers.
+pub static FASTENING_CLAMP: &Kind = &super::fastening_clamp::KIND;
 /// Flexible axle box.
 pub static FLEXIBLE_AXLE_BOX: &Kind = &super::flexible_axle_box::KIND;
 /// Resonance of the sensor on its mounting.

@@ -6,8 +6,8 @@ use crate::outcome::{Hypothesis, UNKNOWN, meet};
 use crate::port_scan::PortPlace;
 use std::collections::BTreeMap;
 use tracktwin_track::extension::{
-    CORRUGATION, EffectFamily, FLEXIBLE_AXLE_BOX, Kind, LookAlikeGroup, SENSOR_MOUNT_RESONANCE,
-    SUBGRADE_LAYER, WHEEL_OUT_OF_ROUND,
+    CORRUGATION, EffectFamily, FASTENING_CLAMP, FLEXIBLE_AXLE_BOX, Kind, LookAlikeGroup,
+    SENSOR_MOUNT_RESONANCE, SUBGRADE_LAYER, WHEEL_OUT_OF_ROUND,
 };
 
 /// Divides the probability of a rail shape that only the inspection detected among the kinds of its group.
@@ -80,26 +80,38 @@ pub(super) fn add_wheel_mode(hypotheses: &mut Vec<Hypothesis>) {
     hypotheses.push(mode);
 }
 
-/// Divides the probability of an accepted layer under a single sleeper between it and a mass on a spring elsewhere
-/// in the track, which no kind describes: an absorber on the rail has the same signature. A subgrade does not change
-/// from one sleeper to the next, so that the unknown element comes first; the layer stays in the model. A weaker effect
-/// that was found at this sleeper beside the layer is not more certain than it.
-pub(super) fn add_resonator(hypotheses: &mut Vec<Hypothesis>, unknown_max: f64) {
-    let is_single = |it: &Hypothesis| {
+/// Largest number of sleepers at which a kind that usually acts at more of them looks like something that no kind
+/// describes. A subgrade does not change from one sleeper to the next: an absorber on the rail has the signature of a
+/// layer under one. Clamps come back every few sleepers: a link between two sleepers looks like a clamp at one or both.
+fn lone_max(physics: &str) -> usize {
+    if physics == SUBGRADE_LAYER.physics {
+        1
+    } else if physics == FASTENING_CLAMP.physics {
+        2
+    } else {
+        0
+    }
+}
+
+/// Divides the probability of an accepted kind at fewer sleepers than it usually has ([`lone_max`]) between it and an unknown
+/// element there. The unknown element comes first; the kind stays in the model. A weaker effect that was found at these
+/// sleepers beside it is not more certain than it.
+pub(super) fn add_unknown_of_lone(hypotheses: &mut Vec<Hypothesis>, unknown_max: f64) {
+    let is_lone = |it: &Hypothesis| {
         let sleepers = it.location.as_ref().map_or(0, |place| place.sleepers.len());
-        it.accepted && it.physics == SUBGRADE_LAYER.physics && sleepers == 1
+        it.accepted && (1..=lone_max(&it.physics)).contains(&sleepers)
     };
     let mut added = Vec::new();
-    for layer in hypotheses.iter_mut().filter(|it| is_single(it)) {
-        let mut unknown = unknown_like(layer, &PortPlace::Seats(Vec::new()), NAMED_SHARE);
+    for lone in hypotheses.iter_mut().filter(|it| is_lone(it)) {
+        let mut unknown = unknown_like(lone, &PortPlace::Seats(Vec::new()), NAMED_SHARE);
         unknown.probability = unknown.probability.min(unknown_max);
         added.push(unknown);
-        layer.probability *= 1.0 - NAMED_SHARE;
+        lone.probability *= 1.0 - NAMED_SHARE;
     }
-    let layers: Vec<Hypothesis> = hypotheses.iter().filter(|it| is_single(it)).cloned().collect();
-    for other in hypotheses.iter_mut().filter(|it| it.accepted && !is_single(it)) {
-        let beside = layers.iter().filter(|layer| {
-            other.location == layer.location && other.log_evidence < layer.log_evidence
+    let all: Vec<Hypothesis> = hypotheses.iter().filter(|it| is_lone(it)).cloned().collect();
+    for other in hypotheses.iter_mut().filter(|it| it.accepted && !is_lone(it)) {
+        let beside = all.iter().filter(|lone| {
+            other.location == lone.location && other.log_evidence < lone.log_evidence
         });
         other.probability = beside.fold(other.probability, |most, it| most.min(it.probability));
     }
@@ -196,7 +208,7 @@ mod tests {
     #[test]
     fn a_layer_under_one_sleeper_is_first_of_all_a_mass_on_a_spring() {
         let mut one = vec![layer(&["SN8"])];
-        add_resonator(&mut one, 0.97);
+        add_unknown_of_lone(&mut one, 0.97);
         let [layer_again, unknown] = &one[..] else { panic!("{one:?}") };
         assert!((unknown.probability - 0.624).abs() < 1e-9 && unknown.accepted);
         assert!((layer_again.probability - 0.336).abs() < 1e-9 && layer_again.accepted);
@@ -207,11 +219,18 @@ mod tests {
         let elsewhere = Hypothesis { location: layer(&["SN9"]).location, ..bolt.clone() };
         let strong = Hypothesis { log_evidence: 170.0, ..layer(&["SN8"]) };
         let mut beside = vec![bolt, elsewhere, strong];
-        add_resonator(&mut beside, 0.97);
+        add_unknown_of_lone(&mut beside, 0.97);
         assert!((beside[0].probability - 0.336).abs() < 1e-9 && beside[1].probability == 0.96);
         let mut run = vec![layer(&["SN8", "SN9"])];
-        add_resonator(&mut run, 0.97);
+        add_unknown_of_lone(&mut run, 0.97);
         assert_eq!(run.len(), 1);
+        let clamps = |sleepers| {
+            let place = layer(sleepers).location;
+            let mut all = vec![Hypothesis::accepted("fastening_clamp", place)];
+            add_unknown_of_lone(&mut all, 0.97);
+            all.len()
+        };
+        assert_eq!([clamps(&["SN8", "SN9"]), clamps(&["SN8", "SN9", "SN12"])], [2, 1]);
     }
 
     #[test]

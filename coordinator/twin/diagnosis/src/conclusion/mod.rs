@@ -13,7 +13,7 @@ mod support_changes;
 mod unlike_neighbours;
 
 pub use self::alone::passes_alone;
-use self::look_alikes::{add_rail_waves, add_resonator, add_siblings, add_wheel_mode};
+use self::look_alikes::{add_rail_waves, add_siblings, add_unknown_of_lone, add_wheel_mode};
 pub(crate) use self::support_changes::further;
 use self::unlike_neighbours::unlike_neighbours;
 use crate::calibration::CalibrationError;
@@ -87,7 +87,7 @@ impl Evidence<'_> {
         add_siblings(&mut hypotheses, &fitted);
         add_rail_waves(&mut hypotheses, |number| self.rail_waves_by_chance(number));
         add_wheel_mode(&mut hypotheses);
-        add_resonator(&mut hypotheses, unknown_max);
+        add_unknown_of_lone(&mut hypotheses, unknown_max);
         add_families(&mut hypotheses, most);
         hypotheses.sort_by(|a, b| {
             b.probability.total_cmp(&a.probability).then(b.accepted.cmp(&a.accepted))
