@@ -173,6 +173,12 @@ pub fn inspect(recording: &Recording) -> Inspection {
     let comb = comb_of_wheel(recording, flat.is_none() && orders.is_empty());
     let hum = chain::hum(recording, turn_m, EACH_TEST);
     let (hum_or_orders, hum) = separate_orders(recording, comb.as_ref(), flat.as_ref(), hum);
+    // At one of the speeds hum may have the frequency of an order.
+    let (flat, orders, on_surface) = if hum.is_empty() {
+        (flat, orders, on_surface)
+    } else {
+        surface(&chain::without_hum(recording, &hum))
+    };
     findings.extend(hum_finding(&hum, unit));
     findings.extend(gains.iter().filter(|gain| gain.is_error(EACH_TEST)).map(gain_finding));
     let scale = chain::scale(recording).filter(|scale| scale.ln_p <= EACH_TEST.ln());

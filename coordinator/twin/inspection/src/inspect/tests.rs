@@ -3,6 +3,7 @@
 use super::*;
 use crate::along::testing::{Chain, LongPass, Rolled, independent};
 use std::f64::consts::TAU;
+use tracktwin_signal::Signal;
 use tracktwin_track::extension::{CLIPPING, ELECTRICAL_HUM, WHEEL_FLAT, WHEEL_OUT_OF_ROUND};
 
 /// Names that the passes of a recording give.
@@ -40,6 +41,23 @@ fn a_dip_waves_and_a_flat_are_named_and_nothing_else() {
         for recording in independent(recording) {
             assert_eq!(names(&recording), [expected], "{}", recording.name);
         }
+    }
+}
+
+/// At 10 km/h the wheel of the rig has its order 22 at 150 Hz.
+#[test]
+fn hum_at_the_frequency_of_an_order_is_no_wave_of_the_wheel() {
+    for mut recording in independent("dev-01") {
+        for (phase, pass) in (0..).zip(&mut recording.passes) {
+            let rate_hz = pass.signal.sample_rate_hz();
+            let hum = |sample: usize| {
+                3.0 * (TAU * 150.0 * sample as f64 / rate_hz + f64::from(phase)).sin()
+            };
+            let samples = pass.signal.samples().iter().enumerate();
+            let samples = samples.map(|(sample, value)| value + hum(sample)).collect();
+            pass.signal = Signal::new(rate_hz, samples).unwrap();
+        }
+        assert_eq!(names(&recording), [ELECTRICAL_HUM.physics], "{}", recording.name);
     }
 }
 
