@@ -46,6 +46,9 @@ const REACH: f64 = 36.0;
 /// power in each part: a wheel is out of round along the whole stretch.
 const PARTS: usize = 3;
 const PART_SHARE: f64 = 0.2;
+/// Largest ratio of the log probability of a line at one speed to the median of all speeds. A line of the wheel is there
+/// at all speeds; one that is 700 times its neighbours at one speed and 3 to 5 times at the others is something else.
+const ALONE_MAX: f64 = 4.0;
 /// Largest distance in orders over which a line may leak, and the smallest ratio of its power to the leaked
 /// power: the side lobes of the Hann window at five cells are 50 dB down.
 const LEAKS: usize = 4;
@@ -148,6 +151,15 @@ pub fn out_of_round(recording: &Recording, circumference_m: f64, alpha: f64) -> 
     found
 }
 
+/// Log probabilities of a line at each speed, none of them counted more than [`ALONE_MAX`] times the median; of two
+/// speeds, than the weaker one.
+fn none_alone(each: &[f64]) -> Vec<f64> {
+    let mut sorted = each.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let least = ALONE_MAX * sorted[sorted.len() / 2];
+    each.iter().map(|ln_p| ln_p.max(least)).collect()
+}
+
 impl Order {
     /// Probability that waves of any length on the rail are taken for some order near this one.
     pub fn share_of_lengths(&self) -> f64 {
@@ -248,7 +260,7 @@ impl OrderSearch<'_> {
                 SpectrumSource::Passes => (each.len(), 0.0),
                 SpectrumSource::Differences => (each.len().min(SPEEDS_APART_MIN), UNEVEN.ln()),
             };
-            let ln_p = combine_dependent_p_values(&each) + uneven;
+            let ln_p = combine_dependent_p_values(&none_alone(&each)) + uneven;
             if repeats < least || ln_p >= best.ln_p {
                 continue;
             }
@@ -349,4 +361,16 @@ fn average(values: &[f64], width: usize) -> Vec<f64> {
         (summed[to] - summed[from]) / (to - from) as f64
     };
     (0..values.len()).map(around).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::none_alone;
+
+    #[test]
+    fn a_line_at_one_speed_counts_four_times_as_much_as_at_the_others() {
+        assert_eq!(none_alone(&[-4.0, -3.0, -63.0]), [-4.0, -3.0, -16.0]);
+        assert_eq!(none_alone(&[-0.1, -20.0, -25.0]), [-0.1, -20.0, -25.0]);
+        assert_eq!(none_alone(&[-30.0, -3.0]), [-12.0, -3.0]);
+    }
 }
