@@ -46,7 +46,7 @@ const REACH: f64 = 36.0;
 /// power in each part: a wheel is out of round along the whole stretch.
 const PARTS: usize = 3;
 const PART_SHARE: f64 = 0.2;
-/// Largest ratio of the log probability of a line at one speed to the median of all speeds. A line of the wheel is there
+/// Largest ratio of the log probability of a line at one speed to the median of all speeds. An order is there
 /// at all speeds; one that is 700 times its neighbours at one speed and 3 to 5 times at the others is something else.
 const ALONE_MAX: f64 = 4.0;
 /// Largest distance in orders over which a line may leak, and the smallest ratio of its power to the leaked
