@@ -21,8 +21,8 @@ use tracktwin_trial::Summary;
 #[command(
     after_help = "In DIR: recordings/, sealed/ (the truth), seals.sha256 (check it with `sha256sum -c`), \
 diagnoses/, scores.jsonl, summary.json, and trial.md with the tables, written again after every case. Repeat the \
-command to continue an interrupted trial. Started on several machines with the same --library, it distributes the cases; the case of a machine that fails goes \
-to another within a minute.\n\nExit codes: 0 all goals reached, 1 some are not, 2 wrong input, 3 failure."
+command to continue an interrupted trial. Started on several machines with the same --library, it distributes the \
+cases; the case of a machine that fails goes to another within a minute.\n\nExit codes: 0 all goals reached, 1 some are not, 2 wrong input, 3 failure."
 )]
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command")]
 pub(super) struct Arguments {

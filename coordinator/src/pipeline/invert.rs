@@ -68,8 +68,9 @@ pub async fn invert(
     let surfaces = f64::from(null_models::SURFACES);
     let share = |done| watch("null model", done as f64 / surfaces);
     let null = null_models::of(prepared, values, library, share).await?;
+    let offset = null.offset();
     for Started { prepared, .. } in &mut started {
-        prepared.forward.expect_offset(&null.offset());
+        prepared.forward.expect_offset(&offset);
     }
     watch("fit", 0.0);
     let count = started.len() as f64;

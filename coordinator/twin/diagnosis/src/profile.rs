@@ -1,8 +1,8 @@
 //! Spectrum, over every sleeper, of the shape that an extension adds to rail or wheel.
 //!
 //! A shape is not random. Over one sleeper, however, its mean power in a band follows from its spectrum, as
-//! for the surface. The two spectra are therefore added. Waves around the whole tread of the wheel are tones: their
-//! spectrum over one sleeper would be wider than that of the wavelet by a sixth.
+//! for the surface. The two spectra are therefore added. Waves around the whole tread of the wheel are tones:
+//! over one sleeper, the spectrum of six waves would be wider than that of the wavelet by a sixth.
 
 use crate::bands::tone_density;
 use crate::section::Section;

@@ -66,7 +66,7 @@ fn error(study: &Study, estimated: &Estimated, parameter: Parameter) -> Option<F
     let median_error = median(errors.iter().map(|error| error.abs()))?;
     let bias = median(errors.iter().copied())?;
     let text = format!(
-        "median error of the logarithm {}, with its sign {}, at {} of {} sleepers",
+        "error of the logarithm: absolute median {}, median {}, at {} of {} sleepers",
         rounded(median_error, 2),
         rounded(bias, 2),
         errors.len(),
@@ -124,7 +124,7 @@ mod tests {
         let all = statements(&study, Method::Inversion, &truth);
         assert!(all.iter().all(|it| it.verdict == ClaimVerdict::Reproduced), "{all:#?}");
         assert!(
-            all[0].found.ends_with("0, with its sign 0, at 100 of 100 sleepers"),
+            all[0].found.ends_with("absolute median 0, median 0, at 100 of 100 sleepers"),
             "{}",
             all[0].found
         );

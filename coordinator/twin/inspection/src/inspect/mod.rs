@@ -4,11 +4,13 @@
 //! sentences.
 
 mod findings;
+mod periodic;
 
 use self::findings::{
     clipping_finding, comb_finding, corrugation_finding, flat_finding, gain_finding, hum_finding,
     impact_finding, offset_finding, order_finding, scale_finding,
 };
+use self::periodic::{Periodic, periodic};
 use crate::along::{by_speed, separate_wavelengths};
 use crate::chain::{Gain, Hum, LossOfContact, Offsets, PassDefect};
 use crate::finding::{Finding, Place};
@@ -164,21 +166,11 @@ pub fn inspect(recording: &Recording) -> Inspection {
     let unit = unit(recording);
     let gains = chain::gains(recording);
     let offsets = chain::offsets(recording);
-    let (flat, orders, on_surface) = surface(recording);
-    let turn_m = flat.as_ref().map(|flat| flat.circumference_m.0);
+    let Periodic { flat, orders, on_surface, comb, hum, hum_or_orders } = periodic(recording);
     let clipping = chain::clipping(recording, EACH_TEST);
     let is_flight_known = chain::expected_m_s2(recording).is_some();
     let cut = clipping_finding(&clipping, recording.passes.len(), unit, is_flight_known);
     let mut findings: Vec<Finding> = cut.into_iter().collect();
-    let comb = comb_of_wheel(recording, flat.is_none() && orders.is_empty());
-    let hum = chain::hum(recording, turn_m, EACH_TEST);
-    let (hum_or_orders, hum) = separate_orders(recording, comb.as_ref(), flat.as_ref(), hum);
-    // At one of the speeds hum may have the frequency of an order.
-    let (flat, orders, on_surface) = if hum.is_empty() {
-        (flat, orders, on_surface)
-    } else {
-        surface(&chain::without_hum(recording, &hum))
-    };
     findings.extend(hum_finding(&hum, unit));
     findings.extend(gains.iter().filter(|gain| gain.is_error(EACH_TEST)).map(gain_finding));
     let scale = chain::scale(recording).filter(|scale| scale.ln_p <= EACH_TEST.ln());
