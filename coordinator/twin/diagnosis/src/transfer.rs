@@ -163,6 +163,11 @@ impl Transfer {
         }
     }
 
+    /// The track.
+    pub(crate) const fn model(&self) -> &TrackModel {
+        &self.model
+    }
+
     /// Effect of the further wheels.
     pub(crate) const fn further_wheels(&self) -> &Arc<FurtherWheels> {
         &self.further_wheels

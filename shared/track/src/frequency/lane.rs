@@ -28,6 +28,13 @@ impl Lane {
         Self { re: array::from_fn(re), im: array::from_fn(im) }
     }
 
+    /// At most [`LANES`] values: the last one repeats.
+    #[inline(always)]
+    pub(super) fn from_values(count: usize, value: impl Fn(usize) -> Complex64) -> Self {
+        let value = |lane: usize| value(lane.min(count - 1));
+        Self::from_parts(|lane| value(lane).re, |lane| value(lane).im)
+    }
+
     #[inline(always)]
     pub(super) fn recip(self) -> Self {
         let scale: [f64; LANES] =

@@ -89,9 +89,9 @@ pub fn seat_stiffness(model: &TrackModel, frequencies_hz: &[f64]) -> Vec<Vec<Com
     let seats: Vec<_> =
         sleepers.map(|sleeper| layout.rail_node_dofs(sleeper.rail_node)[0]).collect();
     let chunks = frequencies_hz.par_chunks(LANES).flat_map_iter(|chunk| {
-        let rail = pulp::Arch::new()
-            .dispatch(|| partition.rail(&partition.dynamic_stiffness(omega(chunk))));
-        let at = |seat: &Option<usize>| seat.map_or(Lane::default(), |seat| rail.diagonal(seat));
+        let diagonal = pulp::Arch::new()
+            .dispatch(|| partition.diagonal(&partition.dynamic_stiffness(omega(chunk))));
+        let at = |seat: &Option<usize>| seat.map_or(Lane::default(), |seat| diagonal[seat]);
         let lanes: Vec<Lane> = seats.iter().map(at).collect();
         (0..chunk.len()).map(move |lane| lanes.iter().map(|value| value.get(lane)).collect())
     });
@@ -234,6 +234,24 @@ impl<'a> Partition<'a> {
             piece.condense(value, |row, column, value| rail.add(row, column, value));
         }
         rail
+    }
+
+    /// The diagonal of the dynamic stiffness of the rail with all connected pieces.
+    #[inline(always)]
+    fn diagonal(&self, value: &impl Fn(usize) -> Lane) -> Vec<Lane> {
+        let mut diagonal = vec![Lane::default(); self.rail_dofs];
+        let mut add = |row: usize, column: usize, value: Lane| {
+            if row == column {
+                diagonal[row] = diagonal[row] + value;
+            }
+        };
+        for &(row, column, place) in self.rail.iter().filter(|(row, column, _)| row == column) {
+            add(row, column, value(place));
+        }
+        for piece in &self.pieces {
+            piece.condense(value, &mut add);
+        }
+        diagonal
     }
 
     /// The inverse of the dynamic stiffness of the rail with all connected pieces.

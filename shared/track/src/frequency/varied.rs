@@ -102,18 +102,27 @@ impl KnownRail {
         let near = difference.near(&dofs, reach);
         let chunks = self.frequencies_hz.par_chunks(LANES).zip(&self.inverses).enumerate();
         let changed = chunks.flat_map_iter(|(index, (chunk, inverses))| {
-            let omega = omega(chunk);
-            let (changes, columns) = pulp::Arch::new().dispatch(|| {
-                (difference.changes(&omega), difference.columns(inverses, &dofs, near.clone()))
-            });
             let known = &self.direct[index * LANES..][..chunk.len()];
+            let lowered = pulp::Arch::new().dispatch(|| {
+                let changes = difference.changes(&omega(chunk));
+                let columns = difference.columns(inverses, &dofs, near.clone());
+                let resisted = packed(chunk.len(), |lane| {
+                    let [changes, at_dofs] = [&changes, &columns.at_dofs]
+                        .map(|matrix| matrix.map(|value| value.get(lane)));
+                    resisted(&changes, &at_dofs)
+                });
+                let lowered = near.clone().enumerate().map(|(row, node)| {
+                    let direct = Lane::from_values(chunk.len(), |lane| known[lane][node]);
+                    lowered(direct, &resisted, &columns.at_nodes, row)
+                });
+                lowered.collect::<Vec<_>>()
+            });
             let near = near.clone();
             known.iter().enumerate().map(move |(lane, known)| {
-                let unpack = |matrix: &DMatrix<Lane>| matrix.map(|value| value.get(lane));
-                let changes = unpack(&changes);
-                let [at_dofs, at_nodes] = [&columns.at_dofs, &columns.at_nodes].map(unpack);
                 let mut direct = known.clone();
-                lower(&mut direct[near.clone()], &changes, &at_dofs, &at_nodes);
+                for (direct, lowered) in direct[near.clone()].iter_mut().zip(&lowered) {
+                    *direct = lowered.get(lane);
+                }
                 direct
             })
         });
@@ -134,25 +143,26 @@ pub(super) fn resisted(
     resisting.lu().solve(changes).unwrap_or_else(none)
 }
 
-/// Adds `changes` to the dynamic stiffness at some degrees of freedom. The direct receptances decrease
-/// by the diagonal of `B (1 + Z A)^-1 Z B'`, with the changes `Z`, the receptances `A` between these
-/// degrees of freedom, and the receptances `B` from these degrees of freedom to each node.
-fn lower(
-    direct: &mut [Complex64],
-    changes: &DMatrix<Complex64>,
-    at_dofs: &DMatrix<Complex64>,
-    at_nodes: &DMatrix<Complex64>,
-) {
-    let count = changes.nrows();
-    let resisted = resisted(changes, at_dofs);
-    for (node, direct) in direct.iter_mut().enumerate() {
-        let row = at_nodes.row(node);
-        for a in 0..count {
-            for b in 0..count {
-                *direct -= row[a] * resisted[(a, b)] * row[b];
-            }
+/// Direct receptance at a node after the dynamic stiffness changes at some degrees of freedom: lower by the
+/// node's entry on the diagonal of `B (1 + Z A)^-1 Z B'`, with the changes `Z`, the receptances `A` between
+/// these degrees of freedom, and the receptances `B` from these degrees of freedom to each node.
+#[inline(always)]
+fn lowered(direct: Lane, resisted: &DMatrix<Lane>, at_nodes: &DMatrix<Lane>, node: usize) -> Lane {
+    let count = resisted.nrows();
+    let mut lowered = direct;
+    for a in 0..count {
+        for b in 0..count {
+            lowered = lowered - at_nodes[(node, a)] * resisted[(a, b)] * at_nodes[(node, b)];
         }
     }
+    lowered
+}
+
+/// The matrices of some lanes as one.
+fn packed(lanes: usize, of_lane: impl Fn(usize) -> DMatrix<Complex64>) -> DMatrix<Lane> {
+    let matrices: Vec<_> = (0..lanes).map(of_lane).collect();
+    let (rows, columns) = matrices[0].shape();
+    DMatrix::from_fn(rows, columns, |a, b| Lane::from_values(lanes, |lane| matrices[lane][(a, b)]))
 }
 
 /// Columns of the inverse of the known rail, one per changed degree of freedom.

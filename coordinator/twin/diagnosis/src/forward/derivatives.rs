@@ -83,7 +83,7 @@ impl Forward {
         extensions: &[Arc<dyn Extension>],
     ) -> Result<Linearised, ModelError> {
         let transfer = self.transfer(values, extensions, true)?;
-        let variations = self.variations(values, extensions)?;
+        let variations = self.variations(transfer.model(), values, extensions)?;
         let excitation = self.excitation(&transfer, values);
         let supports = SupportChanges::new(self, &transfer, &variations, &excitation);
         let state = State { transfer, supports, excitation };
@@ -193,9 +193,11 @@ impl Forward {
     /// Derivatives of each sleeper's dynamic stiffness under the rail with respect to the logarithms of
     /// `k_b`, `k_p`, `EI_s`, `c_p` and `c_b`: `[parameter][line][sleeper of the track]`.
     ///
-    /// They are computed on the model with its extensions, which may be in series with a support.
+    /// They are computed on the model of these values with its extensions, which may be in series with a
+    /// support.
     fn variations(
         &self,
+        model: &TrackModel,
         values: &DVector<f64>,
         extensions: &[Arc<dyn Extension>],
     ) -> Result<[Variation; VARIED], ModelError> {
@@ -208,7 +210,7 @@ impl Forward {
             let model = TrackModel::build(&self.section.track.design, &mesh, &varied, extensions)?;
             Ok(seat_stiffness(&model, lines))
         };
-        let plain = stiffness(|_| ())?;
+        let plain = seat_stiffness(model, lines);
         let derivative = |vary: fn(&mut Support)| {
             let mut changed = stiffness(vary)?;
             for (changed, plain) in changed.iter_mut().flatten().zip(plain.iter().flatten()) {
