@@ -285,8 +285,7 @@ fn by_models(
     let inspection = compute(|| inspect(recording));
     let compared = inspection.comparable(&inspection.without_hum(recording));
     let mut evaluation = compute(|| evaluator.evaluate(&compared)).or_input()?;
-    notes.extend(evaluator.varied_design());
-    let mut said = evaluation.notes.clone();
+    let mut said = [evaluator.notes(), evaluation.notes.clone()].concat();
     let outside = evaluation.outside_library.sentences();
     said.retain(|note| !outside.contains(note));
     said.extend(inspection.notes_on_not_compared(recording));

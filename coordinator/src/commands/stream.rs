@@ -93,6 +93,9 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let library = library.open_whole().await?;
     let models = load_models(&models)?;
     let evaluator = Evaluator::new(models, &library).await.map_err(super::evaluate::stop)?;
+    for note in evaluator.notes() {
+        println_stderr(&note);
+    }
     let design = evaluator.design_for(&section);
     check_recording(&section, &design, &evaluator.set().speeds_km_h).or_input()?;
     let mut rows = Rows::open(to.as_deref())?;

@@ -34,6 +34,14 @@ const CHANGE: f64 = 0.1;
 /// nominal value.
 const SECTION_MAX: f64 = 2.5;
 
+/// Largest length of a half sleeper divided by the distance of its rail seat from the middle. Sleepers of lines have 1.6 to
+/// 2.0; the length of a whole sleeper would give more than three.
+const HALF_LENGTH_MAX: f64 = 2.5;
+
+/// Largest radius of a wheel divided by the sleeper spacing. Wheels of lines have 0.5 to 1.1; the diameter of a usual wheel
+/// would give 1.5.
+const RADIUS_MAX: f64 = 1.2;
+
 /// Wavelengths in m, and limits of the one-third-octave levels in dB re 1 um (ISO 3095:2013, Figure 2).
 const ISO_3095: [(f64, f64); 5] =
     [(0.4, 17.1), (0.2, 11.0), (0.1, 4.9), (0.05, -1.1), (0.025, -5.6)];
@@ -71,6 +79,10 @@ pub struct TrackCheck {
     pub parameters: Vec<Tellable>,
     /// E I of the described sleeper section divided by the nominal bending stiffness.
     pub sleeper_section_ratio: f64,
+    /// Length of a half sleeper divided by the distance of the rail seat from the middle; `None` if the seat is there.
+    pub half_length_ratio: Option<f64>,
+    /// Radius of the wheel divided by the sleeper spacing.
+    pub wheel_radius_ratio: f64,
 }
 
 /// Level of the surface in one one-third octave.
@@ -197,6 +209,9 @@ pub fn check(track: &Track) -> Result<TrackCheck, CheckError> {
         parameters,
         sleeper_section_ratio: design.sleeper.section.bending_stiffness()
             / track.nominal[Parameter::SleeperBendingStiffness],
+        half_length_ratio: (design.sleeper.rail_seat_m > 0.0)
+            .then(|| design.sleeper.half_length_m / design.sleeper.rail_seat_m),
+        wheel_radius_ratio: design.wheel.radius_m / design.sleeper.spacing_m,
     })
 }
 
@@ -318,6 +333,19 @@ impl TrackCheck {
                 rounded(ratio, 2)
             ));
         }
+        if let Some(ratio) = self.half_length_ratio.filter(|ratio| *ratio > HALF_LENGTH_MAX) {
+            doubts.push(format!(
+                "half_length_m is {} times rail_seat_m, on lines 1.6 to 2.0 times: state half the length of the sleeper, and \
+                 the distance of the rail seat from the middle of the track",
+                rounded(ratio, 2)
+            ));
+        }
+        if self.wheel_radius_ratio > RADIUS_MAX {
+            doubts.push(format!(
+                "radius_m is {} times spacing_m, on lines 0.5 to 1.1 times: state the radius of the wheel, not its diameter",
+                rounded(self.wheel_radius_ratio, 2)
+            ));
+        }
         for parameter in self.parameters.iter().filter(|it| it.change_db.abs() < 0.05) {
             doubts.push(format!(
                 "{} can hardly be told: a change of 10 % changes no level by more than {:.2} dB",
@@ -358,6 +386,21 @@ mod tests {
         track.nominal[Parameter::IrregularityLevel] = 0.19;
         let at_10_cm = surface_level(&track, (0.1, 4.9));
         assert!((at_10_cm.level_db - 4.9).abs() < 0.2, "{at_10_cm:?}");
+    }
+
+    #[test]
+    fn whole_lengths_and_diameters_are_doubted_and_no_preset_is() {
+        let doubts = |track: &Track| check(track).unwrap().doubts();
+        for preset in Preset::ALL {
+            let doubts = doubts(&preset.track());
+            assert!(!doubts.iter().any(|it| it.contains("on lines")), "{preset:?} {doubts:?}");
+        }
+        let mut track = Preset::Concrete60E1.track();
+        track.design.sleeper.half_length_m *= 2.0;
+        track.design.wheel.radius_m *= 2.0;
+        let doubts = doubts(&track);
+        assert!(doubts.iter().any(|it| it.starts_with("half_length_m is 3.4 times")), "{doubts:?}");
+        assert!(doubts.iter().any(|it| it.starts_with("radius_m is 1.5 times")), "{doubts:?}");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use crate::pipeline;
 use crate::pipeline::train::TrainingError;
 use tracktwin_evaluation::{BySpeeds, Error, Evaluation, Stream, Twin};
-use tracktwin_experiment::Experiment;
+use tracktwin_experiment::{Experiment, MODEL_HASH};
 use tracktwin_library::{Library, LibraryError};
 use tracktwin_parameters::{DesignAxis, ParameterSet, TrackDesign};
 use tracktwin_signal::recording::Recording;
@@ -19,6 +19,7 @@ pub struct Evaluator {
     by_speeds: BySpeeds,
     experiment: Experiment,
     fixed: ParameterSet,
+    other_model: Option<String>,
 }
 
 /// Design of the track of an experiment that is most similar to that of a recording: varied numbers have the
@@ -62,7 +63,9 @@ impl Evaluator {
             _ => Extractor::new(features)?,
         };
         let fixed = pipeline::train::fixed(&campaign)?;
-        Ok(Self { extractor, models, set, by_speeds: BySpeeds::default(), experiment, fixed })
+        let other_model = other_model(library.check_model(&campaign.id, MODEL_HASH).await)?;
+        let by_speeds = BySpeeds::default();
+        Ok(Self { extractor, models, set, by_speeds, experiment, fixed, other_model })
     }
 
     /// The trained models.
@@ -86,8 +89,14 @@ impl Evaluator {
         design_for(&self.experiment, recording)
     }
 
+    /// What the library limits: its cases are those of another version of the physics, or differ in numbers of the
+    /// description.
+    pub fn notes(&self) -> Vec<String> {
+        self.other_model.iter().cloned().chain(self.varied_design()).collect()
+    }
+
     /// The numbers of the description that differ in the library, as a note. `None` if there are none.
-    pub fn varied_design(&self) -> Option<String> {
+    fn varied_design(&self) -> Option<String> {
         let range = |axis: &DesignAxis| {
             let DesignAxis { number, low, high, .. } = axis;
             format!("{} {low} to {high} {}", number.key(), number.unit()).trim_end().to_owned()
@@ -146,6 +155,19 @@ impl std::fmt::Debug for Evaluator {
     }
 }
 
+/// The note on results that another version of the physics computed, from the library's check of the model.
+fn other_model(checked: Result<(), LibraryError>) -> Result<Option<String>, EvaluatorError> {
+    match checked {
+        Ok(()) => Ok(None),
+        Err(LibraryError::OtherModel { campaign, stored, own }) => Ok(Some(format!(
+            "the cases of campaign {campaign} were computed with model {stored}, this program has model {own}: the estimates \
+             are those of the former; for the latter, compute the cases again (`tracktwin campaign retry {campaign} \
+             --other-model`, then `tracktwin run` or a coordinator) and train on them"
+        ))),
+        Err(unread) => Err(EvaluatorError::Library(TrainingError::Library(unread))),
+    }
+}
+
 /// The error for a campaign that cannot be read: the models are of another library only if the campaign is unknown.
 pub(crate) fn no_campaign(error: LibraryError) -> EvaluatorError {
     match error {
@@ -157,6 +179,22 @@ pub(crate) fn no_campaign(error: LibraryError) -> EvaluatorError {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn cases_of_another_model_are_a_note_and_a_library_that_is_away_is_an_error() {
+        let other = |stored: &str| LibraryError::OtherModel {
+            campaign: "c".to_owned(),
+            stored: stored.to_owned(),
+            own: "new".to_owned(),
+        };
+        assert_eq!(other_model(Ok(())).unwrap(), None);
+        let note = other_model(Err(other("old"))).unwrap().unwrap();
+        for part in ["campaign c", "model old", "model new", "--other-model"] {
+            assert!(note.contains(part), "{part} is not in {note}");
+        }
+        let away = LibraryError::Unavailable { reason: "no response".to_owned() };
+        assert!(other_model(Err(away)).is_err());
+    }
 
     #[test]
     fn a_library_that_is_away_is_not_another_library() {

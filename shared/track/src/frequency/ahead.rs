@@ -3,6 +3,7 @@
 use super::banded::Inverse;
 use super::lane::{LANES, Lane, omega};
 use super::rail::{Partition, deflections};
+use super::vectorized::vectorized;
 use crate::model::TrackModel;
 use num_complex::Complex64;
 use rayon::prelude::*;
@@ -19,7 +20,10 @@ pub fn receptances_ahead(
     let partition = Partition::new(model);
     let pairs = Pairs::ahead(model, distance_m);
     let chunks = frequencies_hz.par_chunks(LANES).flat_map_iter(|chunk| {
-        let lanes = pulp::Arch::new().dispatch(|| pairs.values(&partition.inverted(omega(chunk))));
+        let lanes = vectorized(
+            #[inline(always)]
+            || pairs.values(&partition.inverted(omega(chunk))),
+        );
         (0..chunk.len()).map(move |lane| lanes.iter().map(|value| value.get(lane)).collect())
     });
     let values = chunks.collect();
@@ -46,7 +50,10 @@ impl Between {
         let pairs = Pairs::all(model);
         let mut values = Vec::with_capacity(frequencies_hz.len());
         for (chunk, inverse) in frequencies_hz.chunks(LANES).zip(inverses) {
-            let lanes = pulp::Arch::new().dispatch(|| pairs.values(inverse));
+            let lanes = vectorized(
+                #[inline(always)]
+                || pairs.values(inverse),
+            );
             let of_lane = |lane: usize| lanes.iter().map(|value| value.get(lane)).collect();
             values.extend((0..chunk.len()).map(of_lane));
         }

@@ -8,6 +8,7 @@ use super::rail::{Near, Partition, Solved, deflections, near_seats};
 use super::receptances::{RailReceptances, SeatReceptances};
 use super::states::{Hold, States};
 use super::varied::{CHANGED_MAX, Columns, Difference, resisted};
+use super::vectorized::vectorized;
 use crate::model::TrackModel;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -123,14 +124,17 @@ impl States {
         let columns_at =
             self.near.start.saturating_sub(reach)..(self.near.end + reach).min(dofs.len());
         let solved = frequencies_hz.par_chunks(LANES).flat_map_iter(|chunk| {
-            let (solved, columns, changes) = pulp::Arch::new().dispatch(|| {
-                let omega = omega(chunk);
-                let inverses = partition.inverted_both(&omega);
-                let solved = Solved::new(&inverses[0], Some(&inverses[1]), &dofs, &near);
-                let columns = differences[0].columns(&inverses, &dofs, columns_at.clone());
-                let changes: Vec<_> = differences.iter().map(|it| it.changes(&omega)).collect();
-                (solved, columns, changes)
-            });
+            let (solved, columns, changes) = vectorized(
+                #[inline(always)]
+                || {
+                    let omega = omega(chunk);
+                    let inverses = partition.inverted_both(&omega);
+                    let solved = Solved::new(&inverses[0], Some(&inverses[1]), &dofs, &near);
+                    let columns = differences[0].columns(&inverses, &dofs, columns_at.clone());
+                    let changes: Vec<_> = differences.iter().map(|it| it.changes(&omega)).collect();
+                    (solved, columns, changes)
+                },
+            );
             let of_lane = |lane: usize| {
                 let (first, from_seats) = solved.unpack(lane, &near);
                 let of_state = |changes| Reduction::new(&columns, changes, lane, columns_at.start);

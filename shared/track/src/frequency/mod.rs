@@ -19,6 +19,7 @@ mod receptance;
 mod receptances;
 mod states;
 mod varied;
+mod vectorized;
 
 pub use ahead::{receptances_ahead, shares};
 pub use by_state::StateReceptances;
@@ -27,3 +28,4 @@ pub use rail::seat_stiffness;
 pub use receptance::{FrequencyError, ReceptancePoint, receptance};
 pub use receptances::{RailReceptances, SeatReceptances};
 pub use varied::KnownRail;
+pub use vectorized::vectorized;

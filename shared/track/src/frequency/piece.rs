@@ -42,16 +42,16 @@ impl Piece {
             own.add(row, column, value(place));
         }
         own.factor();
-        let solved = self.touched.iter().map(|(_, entries)| {
+        let mut solved = Vec::with_capacity(self.touched.len());
+        for (_, entries) in &self.touched {
             let mut column = vec![Lane::default(); self.dofs.len()];
             for &(row, place) in entries {
                 column[row] = column[row] + value(place);
             }
             let first = entries.iter().map(|&(row, _)| row).min().unwrap_or(0);
             own.forward(&mut column, first);
-            column
-        });
-        let solved: Vec<Vec<Lane>> = solved.collect();
+            solved.push(column);
+        }
         for (a, left) in solved.iter().enumerate() {
             for (b, right) in solved.iter().enumerate().take(a + 1) {
                 let mut sum = Lane::default();

@@ -9,6 +9,7 @@ use super::lane::{LANES, Lane, omega};
 use super::piece::{Piece, pieces};
 use super::receptances::{RailReceptances, SeatReceptances};
 use super::states::States;
+use super::vectorized::vectorized;
 use crate::model::{Matrices, TrackModel};
 use num_complex::Complex64;
 use rayon::prelude::*;
@@ -50,8 +51,10 @@ impl RailReceptances {
         let solved: Vec<_> = frequencies_hz
             .par_chunks(LANES)
             .map(|chunk| {
-                let solve = || partition.solve(omega(chunk), &nodes, &near);
-                let lanes = pulp::Arch::new().dispatch(solve);
+                let lanes = vectorized(
+                    #[inline(always)]
+                    || partition.solve(omega(chunk), &nodes, &near),
+                );
                 (0..chunk.len()).map(|lane| lanes.unpack(lane, &near)).collect::<Vec<_>>()
             })
             .collect();
@@ -89,8 +92,10 @@ pub fn seat_stiffness(model: &TrackModel, frequencies_hz: &[f64]) -> Vec<Vec<Com
     let seats: Vec<_> =
         sleepers.map(|sleeper| layout.rail_node_dofs(sleeper.rail_node)[0]).collect();
     let chunks = frequencies_hz.par_chunks(LANES).flat_map_iter(|chunk| {
-        let diagonal = pulp::Arch::new()
-            .dispatch(|| partition.diagonal(&partition.dynamic_stiffness(omega(chunk))));
+        let diagonal = vectorized(
+            #[inline(always)]
+            || partition.diagonal(&partition.dynamic_stiffness(omega(chunk))),
+        );
         let at = |seat: &Option<usize>| seat.map_or(Lane::default(), |seat| diagonal[seat]);
         let lanes: Vec<Lane> = seats.iter().map(at).collect();
         (0..chunk.len()).map(move |lane| lanes.iter().map(|value| value.get(lane)).collect())
@@ -150,11 +155,14 @@ impl Solved {
         near: &[Near],
     ) -> Self {
         let mut work = vec![Lane::default(); inverse.size()];
-        let of_seat = |near: &Near| match mirrored {
-            Some(mirrored) => near.receptances(nodes, [inverse, mirrored], &mut work),
-            None => Vec::new(),
-        };
-        Self { direct: inverse.direct(nodes), from_seats: near.iter().map(of_seat).collect() }
+        let mut from_seats = Vec::with_capacity(near.len());
+        for near in near {
+            from_seats.push(match mirrored {
+                Some(mirrored) => near.receptances(nodes, [inverse, mirrored], &mut work),
+                None => Vec::new(),
+            });
+        }
+        Self { direct: inverse.direct(nodes), from_seats }
     }
 
     pub(super) fn unpack(
@@ -210,6 +218,7 @@ impl<'a> Partition<'a> {
     /// The value of `K + i w C - w^2 M` at a place of the matrices.
     #[inline(always)]
     pub(super) fn dynamic_stiffness(&self, omega: impl Fn(usize) -> f64) -> impl Fn(usize) -> Lane {
+        #[inline(always)]
         move |place: usize| {
             let (mass, damping, stiffness) = (
                 self.matrices.mass()[place],

@@ -10,6 +10,7 @@ use super::piece::Piece;
 use super::rail::{Partition, deflections};
 use super::receptances::RailReceptances;
 use super::states::States;
+use super::vectorized::vectorized;
 use crate::model::{Matrices, TrackModel};
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -50,7 +51,10 @@ impl KnownRail {
     pub fn new(model: &TrackModel, frequencies_hz: &[f64]) -> Self {
         let (partition, nodes) = (Partition::new(model), deflections(model));
         let solved = frequencies_hz.par_chunks(LANES).map(|chunk| {
-            let inverses = pulp::Arch::new().dispatch(|| partition.inverted_both(omega(chunk)));
+            let inverses = vectorized(
+                #[inline(always)]
+                || partition.inverted_both(omega(chunk)),
+            );
             let direct = inverses[0].direct(&nodes);
             let of_lane = |lane: usize| direct.iter().map(|value| value.get(lane)).collect();
             let direct: Vec<Vec<Complex64>> = (0..chunk.len()).map(of_lane).collect();
@@ -103,20 +107,10 @@ impl KnownRail {
         let chunks = self.frequencies_hz.par_chunks(LANES).zip(&self.inverses).enumerate();
         let changed = chunks.flat_map_iter(|(index, (chunk, inverses))| {
             let known = &self.direct[index * LANES..][..chunk.len()];
-            let lowered = pulp::Arch::new().dispatch(|| {
-                let changes = difference.changes(&omega(chunk));
-                let columns = difference.columns(inverses, &dofs, near.clone());
-                let resisted = packed(chunk.len(), |lane| {
-                    let [changes, at_dofs] = [&changes, &columns.at_dofs]
-                        .map(|matrix| matrix.map(|value| value.get(lane)));
-                    resisted(&changes, &at_dofs)
-                });
-                let lowered = near.clone().enumerate().map(|(row, node)| {
-                    let direct = Lane::from_values(chunk.len(), |lane| known[lane][node]);
-                    lowered(direct, &resisted, &columns.at_nodes, row)
-                });
-                lowered.collect::<Vec<_>>()
-            });
+            let lowered = vectorized(
+                #[inline(always)]
+                || difference.direct(chunk, known, inverses, (&dofs, near.clone())),
+            );
             let near = near.clone();
             known.iter().enumerate().map(move |(lane, known)| {
                 let mut direct = known.clone();
@@ -224,6 +218,33 @@ impl<'a> Difference<'a> {
         let last = dofs.iter().rposition(|dof| dof.is_some_and(|dof| dof <= to));
         let last = last.unwrap_or(dofs.len() - 1);
         first.min(last).saturating_sub(reach)..(first.max(last) + reach + 1).min(dofs.len())
+    }
+
+    /// Direct receptances of the other track at the nodes near the differences, from those of the known track at each
+    /// of these frequencies and the inverse of its rail. `dofs` are the [`deflections`].
+    #[inline(always)]
+    fn direct(
+        &self,
+        frequencies_hz: &[f64],
+        known: &[Vec<Complex64>],
+        inverses: &[Inverse; 2],
+        (dofs, near): (&[Option<usize>], Range<usize>),
+    ) -> Vec<Lane> {
+        let lanes = frequencies_hz.len();
+        let changes = self.changes(&omega(frequencies_hz));
+        let columns = self.columns(inverses, dofs, near.clone());
+        let resisted = packed(lanes, |lane| {
+            let [changes, at_dofs] =
+                [&changes, &columns.at_dofs].map(|matrix| matrix.map(|value| value.get(lane)));
+            resisted(&changes, &at_dofs)
+        });
+        let mut direct = Vec::with_capacity(near.len());
+        // No iterator adaptor collects here: its loop would not be compiled for the instruction set.
+        for (row, node) in near.enumerate() {
+            let known = Lane::from_values(lanes, |lane| known[lane][node]);
+            direct.push(lowered(known, &resisted, &columns.at_nodes, row));
+        }
+        direct
     }
 
     /// Changes of the dynamic stiffness between the changed degrees of freedom.

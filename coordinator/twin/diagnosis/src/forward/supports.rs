@@ -9,6 +9,7 @@ use crate::transfer::Transfer;
 use num_complex::Complex64;
 use rayon::prelude::*;
 use std::ops::Range;
+use tracktwin_track::frequency::vectorized;
 
 /// Number of varied values of a support.
 pub(super) const VARIED: usize = 5;
@@ -74,10 +75,13 @@ impl FromSleeper {
             return Self { near, changes: Vec::new() };
         }
         let nodes = nodes(forward, near.clone());
-        let changes = pulp::Arch::new().dispatch(|| {
-            let by_line = by_line(transfer, variations, in_track, &nodes);
-            over_windows(forward, excitation, &by_line, &near, &nodes)
-        });
+        let changes = vectorized(
+            #[inline(always)]
+            || {
+                let by_line = by_line(transfer, variations, in_track, &nodes);
+                over_windows(forward, excitation, &by_line, &near, &nodes)
+            },
+        );
         Self { near, changes }
     }
 }
