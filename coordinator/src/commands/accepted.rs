@@ -26,12 +26,14 @@ pub(super) fn with_physics(diagnosis: &Diagnosis) -> String {
     let accepted = diagnosis.hypotheses.iter().filter(|hypothesis| hypothesis.accepted);
     let (mut known, mut others) = (Vec::new(), Vec::new());
     for hypothesis in accepted {
-        match modelled(hypothesis) {
-            Some(kind) => known.push(format!("{} ({})", kind.summary, kind.physics)),
-            None => others.push(hypothesis.physics.as_str()),
+        let (list, text) = match modelled(hypothesis) {
+            Some(kind) => (&mut known, format!("{} ({})", kind.summary, kind.physics)),
+            None => (&mut others, hypothesis.physics.clone()),
+        };
+        if !list.contains(&text) {
+            list.push(text);
         }
     }
-    known.dedup();
     let text = if known.is_empty() {
         "Nothing that the diagnosis accepted can be added to the track model.".to_owned()
     } else {

@@ -303,7 +303,7 @@ fn tellable(
     let sum = |response: &Response, first: usize| -> f64 {
         (first..first + band).map(|line| response.power(line)).sum()
     };
-    let bands = (0..frequencies.len() - band).step_by(band);
+    let bands = (0..=frequencies.len() - band).step_by(band);
     let changes = bands.map(|first| {
         let change_db = 10.0 * (sum(&changed, first) / sum(nominal, first)).log10();
         (change_db, frequencies[first + band / 2])

@@ -108,19 +108,21 @@ fn hammer_test(arguments: &Arguments, track: &Track) -> HammerTest {
         let normal: f64 = StandardNormal.sample(&mut random);
         (0.01 * arguments.unevenness * normal).exp()
     };
-    let settings = |number: usize, set: ParameterSet| {
-        arguments.settings.iter().fold(set, |set, setting| setting.apply(set, number))
+    // Unevenness is that of the stated track; what is stated of single sleepers is their value.
+    let (single, everywhere): (Vec<_>, Vec<_>) =
+        arguments.settings.iter().partition(|setting| setting.sleepers.is_some());
+    let apply = |settings: &[&Setting], set: ParameterSet, number: usize| {
+        settings.iter().fold(set, |set, setting| setting.apply(set, number))
     };
+    let others = apply(&everywhere, track.nominal, 0);
     let support = |number: usize| {
-        let mut set = track.nominal;
+        let mut set = others;
         for of in [Parameter::RailpadStiffness, Parameter::BallastStiffness] {
             set[of] *= factor();
         }
-        Support::from(&settings(number, set))
+        Support::from(&apply(&single, set, number))
     };
     let supports = (0..arguments.sleepers).map(support).collect();
-    let everywhere = arguments.settings.iter().filter(|setting| setting.sleepers.is_none());
-    let others = everywhere.fold(track.nominal, |set, setting| setting.apply(set, 0));
     let [low, high] = Selection::usual(&track.design).range_hz;
     let (low, high) = (low / BEYOND, high * BEYOND);
     let steps = ((high / low).log2() * PER_OCTAVE).floor() as usize;

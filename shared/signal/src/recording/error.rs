@@ -259,6 +259,20 @@ pub enum Fault {
         /// The file of the times.
         file: String,
     },
+    /// Two files of one recording have different sample rates.
+    #[error(
+        "is {} Hz, that of {file} is {} Hz; if one recorder made both, state its rate with `--sample-rate HZ`, else import \
+             them separately",
+        rounded(*rate, 7), rounded(*first, 7)
+    )]
+    OtherSampleRate {
+        /// The sample rate of this file in Hz.
+        rate: f64,
+        /// The sample rate of the first file in Hz.
+        first: f64,
+        /// The first file.
+        file: String,
+    },
     /// A step in time differs from the sample interval.
     #[error(
         "the step to row {row} is {} s, but {} s is expected; remove repeated rows, or split \

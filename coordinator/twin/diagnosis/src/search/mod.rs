@@ -286,8 +286,10 @@ impl SearchOutcome {
             let earlier = round.fitted;
             let held_out = setting.held_out(&accepted, &self.last.values)?;
             densities[accepted.len()] = log_densities(&held_out);
-            if accepted.is_empty() {
-                self.baseline = self.last.clone();
+            // What a name that is taken back leaves.
+            match self.rounds.last_mut().and_then(|round| round.fitted.first_mut()) {
+                Some(fitted) => fitted.calibration = self.last.clone(),
+                None => self.baseline = self.last.clone(),
             }
             (round, ports) =
                 setting.round(&problem, &self.last, all, threshold, &hopeless, progress)?;

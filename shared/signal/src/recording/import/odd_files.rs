@@ -372,3 +372,20 @@ fn files_of_loggers_are_named_with_their_mend() {
         assert!(text.contains(said), "{name}: {text}");
     }
 }
+
+#[test]
+fn two_clocks_of_one_recorder_have_one_rate_and_two_recorders_have_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let passes = |clock: f64| {
+        let pass = |name: &str, clock: f64, hertz: f64| {
+            let sub = folder.path().join(name);
+            fs::create_dir_all(&sub).unwrap();
+            changed(&sub, |_, [t, x, acc]| [clock * t, x, acc + (hertz * t).sin()])
+        };
+        import(&[pass("a", 1.0, 700.0), pass("b", clock, 900.0)], &layout())
+    };
+    let both = passes(1.0 + 3e-5).unwrap().remove(0).recording;
+    assert_eq!((both.passes.len(), both.sample_rate_hz), (2, RATE_HZ));
+    let error = passes(1.002).unwrap_err().to_string();
+    assert!(error.contains("run.csv is 2000 Hz") && error.contains("--sample-rate HZ"), "{error}");
+}

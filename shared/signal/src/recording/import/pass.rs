@@ -8,6 +8,10 @@ use super::{AccelerationUnit, Layout, Table, sleepers, speeds};
 use serde_json::{Map, json};
 use std::path::{Path, PathBuf};
 
+/// Relative difference up to which two sample rates are one: clocks of recorders and stamps have errors of some 1e-5, and over
+/// 500 m a ten thousandth is 5 cm.
+const SAME_RATE: f64 = 1e-4;
+
 /// A recording from imported files, with the changes and assumptions of the import.
 #[derive(Clone, Debug)]
 pub struct Imported {
@@ -107,10 +111,10 @@ fn channel(column: &str, layout: &Layout) -> String {
 /// All files have one sample rate, and no file is a copy of another.
 fn alike(raw: &[Raw]) -> Result<(), RecordingError> {
     for other in raw.iter().skip(1) {
-        let (declared, observed) = (raw[0].rate_hz, other.rate_hz);
-        if (observed / declared - 1.0).abs() > 1e-6 {
-            let file = other.path.display().to_string();
-            let fault = Fault::WrongSampleRate { declared, observed, file };
+        let (first, rate) = (raw[0].rate_hz, other.rate_hz);
+        if (rate / first - 1.0).abs() > SAME_RATE {
+            let file = raw[0].path.display().to_string();
+            let fault = Fault::OtherSampleRate { rate, first, file };
             return Err(RecordingError::new(&other.path, "sample_rate_Hz", fault));
         }
     }
