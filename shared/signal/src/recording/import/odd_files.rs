@@ -271,10 +271,20 @@ fn coarse_clocks_are_straightened_and_gaps_refused() {
     let path = changed(folder.path(), |_, [t, x, acc]| [(t * 100.0).floor() / 100.0, x, acc]);
     let notes = sound(&path, &layout());
     assert!(notes.contains("advances in steps of 10 ms"), "{notes}");
-    let late = |row: usize| if row < 500 { 0.0 } else { 0.5 };
-    let path = changed(folder.path(), |row, [t, x, acc]| [t + late(row), x, acc]);
+    let by = |seconds: f64| {
+        let late = move |row: usize| if row < 500 { 0.0 } else { seconds };
+        changed(folder.path(), |row, [t, x, acc]| [t + late(row), x, acc])
+    };
+    let omit = "or state `--sample-rate HZ`";
+    // The clock was set back, but no sample is missing.
+    let text = complaint(&by(-0.1), &layout());
+    assert!(text.contains("to row 501") && text.contains(omit), "{text}");
+    let path = by(0.5);
     let text = complaint(&path, &layout());
-    assert!(text.contains("to row 501") && text.contains("or state `--sample-rate HZ`"), "{text}");
+    assert!(text.contains("to row 501") && !text.contains(omit), "{text}");
+    let rate = Layout { sample_rate_hz: Some(RATE_HZ), time: None, ..layout() };
+    let notes = one(&path, &rate).unwrap().notes.join("\n");
+    assert!(notes.contains("column t has a gap before row 501"), "{notes}");
 }
 
 #[test]

@@ -13,6 +13,8 @@ const ALIKE: f64 = 1e-3;
 const NEAR: f64 = 0.02;
 /// Rates in Hz within which accelerations of an axle box are recorded.
 const PLAUSIBLE_HZ: [f64; 2] = [50.0, 1e7];
+/// Smallest step in sample intervals at which a sample is missing.
+const MISSING: f64 = 1.5;
 /// Names of columns that hold times, in lower case.
 const TIMES: [&str; 8] = ["t", "time", "zeit", "t_s", "time_s", "t_ms", "time_ms", "timestamp"];
 
@@ -90,10 +92,11 @@ fn in_unit(column: &Column, unit: TimeUnit) -> Result<SampleClock, Fault> {
     SampleClock::of(&times)
 }
 
-/// The fault of uneven times with the remedy that only an import has.
+/// The fault of uneven times with the remedy that only an import has: where samples are missing, a rate instead of the times
+/// would place all that follows wrongly.
 fn or_omit(fault: Fault) -> Fault {
     match fault {
-        Fault::UnevenTime { row, step, expected, .. } => {
+        Fault::UnevenTime { row, step, expected, .. } if step < MISSING * expected => {
             let alternative = ", or state `--sample-rate HZ` instead of the time column";
             Fault::UnevenTime { row, step, expected, alternative }
         }
@@ -116,7 +119,7 @@ fn other_unit(per_unit: f64) -> String {
     }
 }
 
-/// Doubt about a column that looks like times with another rate than the stated one.
+/// Doubt about a column that looks like times with another rate than the stated one, or with a gap.
 fn doubt(table: &Table, stated: f64) -> Option<String> {
     let is_time = |column: &&Column| {
         TIMES.contains(&bare_name(&column.name).to_ascii_lowercase().as_str())
@@ -125,6 +128,15 @@ fn doubt(table: &Table, stated: f64) -> Option<String> {
             && column.values.iter().all(|time| time.is_finite())
     };
     let column = table.columns.iter().find(is_time)?;
+    if let Err(Fault::UnevenTime { row, step, expected, .. }) = in_unit(column, TimeUnit::Second)
+        && step >= MISSING * expected
+    {
+        return Some(format!(
+            "doubt: column {} has a gap before row {row}; if it holds times, samples are missing, and all places behind are \
+             wrong: split the file there",
+            column.name
+        ));
+    }
     let rate = |unit: TimeUnit| Some(in_unit(column, unit).ok()?.rate_hz);
     let rates: Vec<f64> = TimeUnit::ALL.iter().filter_map(|(unit, _)| rate(*unit)).collect();
     let agrees = rates.iter().any(|rate| (rate / stated - 1.0).abs() < NEAR);
