@@ -272,8 +272,7 @@ fn coarse_clocks_are_straightened_and_gaps_refused() {
     let notes = sound(&path, &layout());
     assert!(notes.contains("advances in steps of 10 ms"), "{notes}");
     let by = |seconds: f64| {
-        let late = move |row: usize| if row < 500 { 0.0 } else { seconds };
-        changed(folder.path(), |row, [t, x, acc]| [t + late(row), x, acc])
+        changed(folder.path(), |row, [t, x, acc]| [if row < 500 { t } else { t + seconds }, x, acc])
     };
     let omit = "or state `--sample-rate HZ`";
     // The clock was set back, but no sample is missing.
